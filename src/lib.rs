@@ -1,0 +1,18 @@
+//! Sunfleck: progressive photon mapping, and the neighbour search under it.
+//!
+//! Import order, left never names right: `math` → `index` → `layout` → `scene` → `ppm` → `cpu` | `gpu` → `output`.
+//! `cpu` and `gpu` do not know each other.
+
+#[cfg(feature = "render")]
+pub mod cpu;
+#[cfg(all(feature = "render", feature = "gpu"))]
+pub mod gpu;
+pub mod index;
+pub mod layout;
+pub mod math;
+#[cfg(feature = "render")]
+pub mod output;
+#[cfg(feature = "render")]
+pub mod ppm;
+#[cfg(feature = "render")]
+pub mod scene;

@@ -1,0 +1,157 @@
+//! Progressive photon mapping: the algorithm, apart from any backend.
+//!
+//! Each iteration is an independent photon-mapping image with its own camera rays and its own photons; the picture is
+//! the mean of the iterations' images while the radius shrinks (Knaus & Zwicker 2011, "Progressive Photon Mapping: A
+//! Probabilistic Approach").
+
+pub mod film;
+pub mod radius;
+pub mod stages;
+
+use crate::layout;
+pub use film::Film;
+pub use radius::{RadiusSchedule, first_radii};
+pub use stages::{Error, StageTimes, Stages};
+
+/// Density estimation kernel over t = d/r, each with unit integral over the disc.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Kernel {
+    /// 2(1 − t²)/(πr²).
+    #[default]
+    Epanechnikov,
+    /// 1/(πr²).
+    Constant,
+}
+
+/// Who brings the light that comes straight from a lamp.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Direct {
+    /// Lights are sampled where the eye path gathers; photons carry what has bounced.
+    #[default]
+    Sampled,
+    /// Photons carry everything.
+    Photons,
+}
+
+/// The first radius.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum FirstRadius {
+    /// One per pixel, from the pixel's footprint and the density of a first photon pass ([`radius::first_radii`]).
+    #[default]
+    Automatic,
+    /// The same everywhere, metres.
+    Fixed(f32),
+}
+
+/// What a render is asked to do. Nothing here depends on the backend.
+#[derive(Clone, Debug)]
+pub struct Params {
+    /// Whole picture, pixels: width, height.
+    pub size: [u32; 2],
+    /// The part to compute, pixels: x0, y0, x1, y1 (exclusive).
+    pub crop: [u32; 4],
+    /// Same seed, same backend, same adapter: the same bits.
+    pub seed: u32,
+    /// Photon paths emitted an iteration.
+    pub n_paths: u32,
+    /// Knaus & Zwicker's α in (0, 1): the share of the radius' area that an iteration keeps is (i+α)/(i+1).
+    pub alpha: f32,
+    /// First radius.
+    pub radius: FirstRadius,
+    /// Density estimation kernel.
+    pub kernel: Kernel,
+    /// Who brings direct light.
+    pub direct: Direct,
+    /// End paths by Russian roulette; without it they run to `max_eye_segments` and `max_photon_segments`.
+    pub roulette: bool,
+    /// Longest eye path, segments (at most 255).
+    pub max_eye_segments: u32,
+    /// Longest photon path, segments (at most 255).
+    pub max_photon_segments: u32,
+    /// Longest path from lamp to lens, segments; `u32::MAX`: no limit.
+    pub max_segments: u32,
+}
+
+/// Cap on the segments of an eye or photon path that nobody asked to limit; a photon counts them in 8 bits.
+pub const SEGMENT_CAP: u32 = 255;
+
+impl Params {
+    /// The normal mode: Russian roulette, direct light sampled, automatic radius.
+    pub fn new(width: u32, height: u32) -> Self {
+        Self {
+            size: [width, height],
+            crop: [0, 0, width, height],
+            seed: 0,
+            n_paths: 500_000,
+            alpha: 2.0 / 3.0,
+            radius: FirstRadius::Automatic,
+            kernel: Kernel::default(),
+            direct: Direct::default(),
+            roulette: true,
+            max_eye_segments: SEGMENT_CAP,
+            max_photon_segments: SEGMENT_CAP,
+            max_segments: u32::MAX,
+        }
+    }
+
+    /// Width and height of the film, pixels.
+    pub fn film_size(&self) -> [u32; 2] {
+        [self.crop[2] - self.crop[0], self.crop[3] - self.crop[1]]
+    }
+
+    /// The constants of iteration `i` (0: the pilot).
+    pub fn frame(&self, i: u32) -> layout::Frame {
+        let [width, height] = self.film_size();
+        let mut flags = 0;
+        if self.direct == Direct::Sampled {
+            flags |= layout::FRAME_SAMPLE_DIRECT;
+        }
+        if self.roulette {
+            flags |= layout::FRAME_ROULETTE;
+        }
+        if self.kernel == Kernel::Constant {
+            flags |= layout::FRAME_CONSTANT_KERNEL;
+        }
+        layout::Frame {
+            width,
+            height,
+            crop_x: self.crop[0],
+            crop_y: self.crop[1],
+            full_width: self.size[0],
+            full_height: self.size[1],
+            iteration: i,
+            seed: self.seed,
+            n_paths: self.n_paths,
+            max_eye_segments: self.max_eye_segments.min(SEGMENT_CAP),
+            max_photon_segments: self.max_photon_segments.min(SEGMENT_CAP),
+            max_segments: self.max_segments,
+            flags,
+            radius_scale: RadiusSchedule::new(self.alpha).scale(i.max(1)),
+            pad: [0; 2],
+        }
+    }
+}
+
+/// Chooses the first radii and tells the backend. Call once, before the first [`iterate`].
+pub fn start<S: Stages + ?Sized>(stages: &mut S, params: &Params) -> Result<(), Error> {
+    let [width, height] = params.film_size();
+    let radii = match params.radius {
+        FirstRadius::Fixed(r) => vec![r; (width * height) as usize],
+        FirstRadius::Automatic => {
+            let pilot = params.frame(0);
+            stages.trace_eye(&pilot)?;
+            stages.trace_photons(&pilot)?;
+            first_radii(&pilot, &stages.camera(), &stages.eye_vertices()?, &stages.photons()?)
+        }
+    };
+    stages.set_first_radii(&radii)
+}
+
+/// One iteration: the algorithm on one screen.
+pub fn iterate<S: Stages + ?Sized>(stages: &mut S, frame: &layout::Frame) -> Result<(), Error> {
+    stages.trace_eye(frame)?; // pixels → EyeVertex[w·h]
+    stages.trace_photons(frame)?; // lights → Photon[n]
+    stages.build_index(frame)?; // Photon[n] → tree over photons
+    stages.gather(frame)?; // EyeVertex, tree → radiance[w·h]
+    stages.accumulate(frame) // radiance → film
+}
