@@ -1,1 +1,7 @@
-//! To come.
+//! Directions, random numbers and warps. Knows nothing of the rest of the crate.
+
+pub mod frame;
+pub mod morton;
+pub mod oct;
+pub mod rng;
+pub mod warp;
