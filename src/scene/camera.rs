@@ -1,6 +1,6 @@
 //! Cameras as backends read them.
 
-use glam::Vec3;
+use glam::{Affine3A, Mat3A, Vec3};
 
 use super::{Camera, Projection};
 use crate::layout;
@@ -30,9 +30,12 @@ impl Camera {
 
     /// A pinhole at `position` looking at `target` with `up` above; `yfov` in radians, vertical.
     pub fn look_at(name: &str, position: Vec3, target: Vec3, up: Vec3, yfov: f32) -> Self {
+        let back = (position - target).normalize_or(Vec3::Z);
+        let right = up.cross(back).try_normalize().unwrap_or_else(|| back.any_orthonormal_vector());
+        let axes = Mat3A::from_cols(right.into(), back.cross(right).into(), back.into());
         Self {
             name: name.into(),
-            world_from_camera: glam::Affine3A::from_mat4(glam::Mat4::look_at_rh(position, target, up)).inverse(),
+            world_from_camera: Affine3A::from_mat3_translation(axes.into(), position),
             projection: Projection::Perspective { yfov },
             aperture_radius: 0.0,
             focus_distance: position.distance(target),
