@@ -304,3 +304,10 @@ pub enum Projection {
         ymag: f32,
     },
 }
+
+pub mod albedo;
+pub mod bvh;
+mod environment;
+mod packed;
+
+pub use packed::PackedScene;
