@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | `dataWindow`, `displayWindow` | box | the part computed, in the whole picture |
 //! | `chromaticities` | | sRGB's (ITU-R BT.709, D65) |
-//! | `software`, `version` | string | `Sunfleck 0.1.0 (commit)`; version and commit alone |
+//! | `software`, `sunfleckVersion` | string | `Sunfleck 0.1.0 (commit)`; version and commit alone |
 //! | `adapter`, `scene`, `command` | string | device, SCENE as given, the whole command line |
 //! | `seed`, `iterations`, `photonsPerIteration` | int | double where above 2³¹ − 1; photon *paths* |
 //! | `samplesPerPixel` | int | `iterations`, under the name that other tools read |
@@ -96,7 +96,7 @@ fn layer_attributes(picture: &Picture, header: &Header) -> LayerAttributes {
     let text = |s: &str| Text::from_slice_unchecked(s.as_bytes());
     let count = |n: u32| i32::try_from(n).map_or(AttributeValue::F64(f64::from(n)), AttributeValue::I32);
     let other: HashMap<Text, AttributeValue> = [
-        ("version", AttributeValue::Text(text(VERSION))),
+        ("sunfleckVersion", AttributeValue::Text(text(VERSION))),
         ("scene", AttributeValue::Text(text(&header.scene))),
         ("command", AttributeValue::Text(text(&header.command))),
         ("adapter", AttributeValue::Text(text(&header.adapter))),
@@ -254,7 +254,7 @@ mod tests {
         assert_eq!(get("photonsPerIteration"), AttributeValue::I32(500_000));
         assert_eq!(get("alpha"), AttributeValue::F32(0.5));
         assert_eq!(get("lastRadius"), AttributeValue::F32(0.125));
-        assert_eq!(get("version"), AttributeValue::Text(Text::from(VERSION)));
+        assert_eq!(get("sunfleckVersion"), AttributeValue::Text(Text::from(VERSION)));
         let m = Mat4::from_cols_array(&own.world_to_camera.unwrap());
         assert_eq!(m.transform_point3(Vec3::new(5.0, 1.0, 0.0)), Vec3::ZERO);
         assert_eq!(m.transform_point3(Vec3::new(3.0, 1.0, 0.0)), Vec3::new(0.0, 0.0, -2.0));
