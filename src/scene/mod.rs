@@ -290,3 +290,10 @@ pub enum Projection {
         ymag: f32,
     },
 }
+
+pub mod albedo;
+pub mod bvh;
+mod environment;
+mod packed;
+
+pub use packed::PackedScene;
