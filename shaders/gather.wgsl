@@ -82,7 +82,7 @@ fn gather(
                 if eye_segments + (packed >> 24u) > frame.max_segments {
                     continue;
                 }
-                let cosine = dot(normal, oct_decode_24(packed));
+                let cosine = dot(normal, oct_decode24(packed));
                 if select(cosine, abs(cosine), two_sided) < 0.9 {
                     continue;
                 }

@@ -19,16 +19,15 @@ fn spread(value: u32) -> u32 {
     return v;
 }
 
-// Bits of x, y and z at 3k, 3k + 1 and 3k + 2: the lower 10 bits of each axis fill bits 0 to 29, the upper 11 bits 30 to 62.
+// Bits of x, y and z at 3k + 2, 3k + 1 and 3k, as in src/math/morton.rs: the lower 10 bits of each axis fill bits 0 to 29, the upper 11 bits 30 to 62.
 fn morton(cell: vec3<u32>) -> vec2<u32> {
-    let low = spread(cell.x & 0x3ffu) | (spread(cell.y & 0x3ffu) << 1u) | (spread(cell.z & 0x3ffu) << 2u);
+    let low = (spread(cell.x & 0x3ffu) << 2u) | (spread(cell.y & 0x3ffu) << 1u) | spread(cell.z & 0x3ffu);
     let x = spread(cell.x >> 10u);
     let y = spread(cell.y >> 10u);
     let z = spread(cell.z >> 10u);
-    // x | y << 1 | z << 2 has 33 bits; two of them go into the low word.
-    let high_0 = x | (y << 1u) | (z << 2u);
-    let high_32 = z >> 30u;
-    return vec2(low | (high_0 << 30u), (high_0 >> 2u) | (high_32 << 30u));
+    // x << 2 | y << 1 | z has 33 bits; two of them go into the low word.
+    let upper = (x << 2u) | (y << 1u) | z;
+    return vec2(low | (upper << 30u), (upper >> 2u) | ((x >> 30u) << 30u));
 }
 
 // Reads photons and bounds, writes keys and order; one thread per photon. values.x: photons.

@@ -1,35 +1,43 @@
 // Octahedral directions, as in src/math/oct.rs.
 
-fn oct_unfold(x: f32, y: f32) -> vec3<f32> {
-    let z = 1.0 - abs(x) - abs(y);
+// The magnitude of `a` with the sign of `b`, zeros included.
+fn copysign(a: f32, b: f32) -> f32 {
+    return bitcast<f32>((bitcast<u32>(a) & 0x7fffffffu) | (bitcast<u32>(b) & 0x80000000u));
+}
+
+fn unit_from_square(p: vec2<f32>) -> vec3<f32> {
+    let z = 1.0 - abs(p.x) - abs(p.y);
     let t = max(-z, 0.0);
-    let folded = vec3(select(x + t, x - t, x >= 0.0), select(y + t, y - t, y >= 0.0), z);
-    return normalize(folded);
+    return normalize(vec3(p.x - copysign(t, p.x), p.y - copysign(t, p.y), z));
 }
 
-fn oct_decode(packed: u32) -> vec3<f32> {
-    return oct_unfold(f32(packed & 0xffffu) / 65535.0 * 2.0 - 1.0, f32(packed >> 16u) / 65535.0 * 2.0 - 1.0);
+fn oct_decode(bits: u32) -> vec3<f32> {
+    return unit_from_square(vec2(f32(bits & 0xffffu), f32(bits >> 16u)) * (2.0 / 65535.0) - 1.0);
 }
 
-// The low 24 bits: 12 a component.
-fn oct_decode_24(packed: u32) -> vec3<f32> {
-    return oct_unfold(f32(packed & 0xfffu) / 4095.0 * 2.0 - 1.0, f32((packed >> 12u) & 0xfffu) / 4095.0 * 2.0 - 1.0);
+// The low 24 bits, 12 a component.
+fn oct_decode24(bits: u32) -> vec3<f32> {
+    return unit_from_square(vec2(f32(bits & 0xfffu), f32((bits >> 12u) & 0xfffu)) * (2.0 / 4095.0) - 1.0);
 }
 
-fn oct_fold(direction: vec3<f32>) -> vec2<f32> {
-    let v = direction / (abs(direction.x) + abs(direction.y) + abs(direction.z));
+fn square_from_unit(unit: vec3<f32>) -> vec2<f32> {
+    let v = unit / (abs(unit.x) + abs(unit.y) + abs(unit.z));
     if v.z >= 0.0 {
         return v.xy;
     }
-    return vec2(select(abs(v.y) - 1.0, 1.0 - abs(v.y), v.x >= 0.0), select(abs(v.x) - 1.0, 1.0 - abs(v.x), v.y >= 0.0));
+    return vec2((1.0 - abs(v.y)) * copysign(1.0, v.x), (1.0 - abs(v.x)) * copysign(1.0, v.y));
 }
 
-fn oct_encode(direction: vec3<f32>) -> u32 {
-    let q = vec2<u32>(floor(clamp(oct_fold(direction) * 0.5 + 0.5, vec2(0.0), vec2(1.0)) * 65535.0 + 0.5));
-    return q.x | (q.y << 16u);
+fn oct_quantise(v: f32, steps: f32) -> u32 {
+    return u32(clamp(floor((v * 0.5 + 0.5) * steps + 0.5), 0.0, steps));
 }
 
-fn oct_encode_24(direction: vec3<f32>) -> u32 {
-    let q = vec2<u32>(floor(clamp(oct_fold(direction) * 0.5 + 0.5, vec2(0.0), vec2(1.0)) * 4095.0 + 0.5));
-    return q.x | (q.y << 12u);
+fn oct_encode(v: vec3<f32>) -> u32 {
+    let p = square_from_unit(v);
+    return oct_quantise(p.x, 65535.0) | (oct_quantise(p.y, 65535.0) << 16u);
+}
+
+fn oct_encode24(v: vec3<f32>) -> u32 {
+    let p = square_from_unit(v);
+    return oct_quantise(p.x, 4095.0) | (oct_quantise(p.y, 4095.0) << 12u);
 }

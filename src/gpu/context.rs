@@ -270,7 +270,13 @@ impl Context {
     }
 
     /// A buffer of at least one byte; `bound` says how much of it one shader sees at once.
-    pub(super) fn buffer(&self, what: &str, bytes: u64, bound: u64, usage: wgpu::BufferUsages) -> Result<Buffer, Error> {
+    pub(super) fn buffer(
+        &self,
+        what: &str,
+        bytes: u64,
+        bound: u64,
+        usage: wgpu::BufferUsages,
+    ) -> Result<Buffer, Error> {
         let bytes = bytes.max(16).next_multiple_of(16);
         let too_large = |needed: u64, allowed: u64| Error::TooLarge {
             what: what.to_owned(),

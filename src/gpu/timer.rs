@@ -84,7 +84,8 @@ impl Timer {
                 batch.encoder().resolve_query_set(set, 2 * stage..2 * stage + 2, buffer, 0);
                 batch.submit()?;
                 let ticks = readback.read::<u64>(context, shared, buffer, 2)?;
-                let nanoseconds = ticks[1].saturating_sub(ticks[0]) as f64 * f64::from(context.queue.get_timestamp_period());
+                let nanoseconds =
+                    ticks[1].saturating_sub(ticks[0]) as f64 * f64::from(context.queue.get_timestamp_period());
                 self.seconds[stage as usize] = nanoseconds * 1e-9;
                 batch = Batch::new(context, shared, "timestamps");
             }
