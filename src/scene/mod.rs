@@ -153,7 +153,14 @@ impl Material {
 
     /// A black surface that emits.
     pub fn emitter(name: &str, emission: Vec3) -> Self {
-        Self { name: name.into(), base_color: Vec3::ZERO, specular: 0.0, emission, double_sided: false, ..Self::default() }
+        Self {
+            name: name.into(),
+            base_color: Vec3::ZERO,
+            specular: 0.0,
+            emission,
+            double_sided: false,
+            ..Self::default()
+        }
     }
 }
 
@@ -188,7 +195,14 @@ pub struct Texture {
 impl Texture {
     /// The image as it is: first coordinates, repeated, bilinear.
     pub fn new(image: usize) -> Self {
-        Self { image, uv_set: 0, transform: Mat2::IDENTITY, offset: Vec2::ZERO, wrap: [Wrap::Repeat; 2], nearest: false }
+        Self {
+            image,
+            uv_set: 0,
+            transform: Mat2::IDENTITY,
+            offset: Vec2::ZERO,
+            wrap: [Wrap::Repeat; 2],
+            nearest: false,
+        }
     }
 }
 
