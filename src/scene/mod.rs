@@ -309,6 +309,7 @@ pub enum Projection {
 
 pub mod albedo;
 pub mod bvh;
+mod camera;
 mod environment;
 mod packed;
 
