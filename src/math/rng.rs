@@ -67,6 +67,12 @@ impl Rng {
         self.dimension += 1;
         unit4(bits)
     }
+
+    /// Decides where half-transparent surfaces are there for the next ray; draws nothing.
+    #[inline]
+    pub fn alpha_seed(&self) -> u32 {
+        self.path.wrapping_mul(0x9e37_79b1) ^ self.iteration.wrapping_mul(0x85eb_ca6b) ^ self.dimension ^ self.seed
+    }
 }
 
 #[cfg(test)]

@@ -11,11 +11,8 @@ pub fn disc(u: [f32; 2]) -> Vec2 {
     if p == Vec2::ZERO {
         return p;
     }
-    let (r, phi) = if p.x.abs() > p.y.abs() {
-        (p.x, PI / 4.0 * (p.y / p.x))
-    } else {
-        (p.y, PI / 2.0 - PI / 4.0 * (p.x / p.y))
-    };
+    let (r, phi) =
+        if p.x.abs() > p.y.abs() { (p.x, PI / 4.0 * (p.y / p.x)) } else { (p.y, PI / 2.0 - PI / 4.0 * (p.x / p.y)) };
     Vec2::new(r * phi.cos(), r * phi.sin())
 }
 

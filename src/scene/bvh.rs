@@ -106,9 +106,7 @@ fn halve(boxes: &[Aabb], order: &mut [u32], offset: u32, nodes: &mut Vec<SceneNo
     let axis = if d.x >= d.y && d.x >= d.z { 0 } else { 1 + usize::from(d.z > d.y) };
     let middle = order.len() / 2;
     if middle > 0 {
-        order.select_nth_unstable_by(middle, |&a, &b| {
-            centroid(a)[axis].total_cmp(&centroid(b)[axis]).then(a.cmp(&b))
-        });
+        order.select_nth_unstable_by(middle, |&a, &b| centroid(a)[axis].total_cmp(&centroid(b)[axis]).then(a.cmp(&b)));
     }
     let (left, right) = order.split_at_mut(middle);
     let child = |part: &mut [u32], offset: u32, nodes: &mut Vec<SceneNode>| -> Child {

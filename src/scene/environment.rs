@@ -30,8 +30,7 @@ impl Environment {
 /// has density zero.
 pub(super) fn pack(e: &Environment) -> (Vec<[f32; 4]>, Vec<f32>, f32) {
     let (w, h) = (e.width as usize, e.height as usize);
-    let luminance =
-        |x: usize, y: usize| f64::from(e.texels[y * w + x].dot(Vec3::new(0.2126, 0.7152, 0.0722)).max(0.0));
+    let luminance = |x: usize, y: usize| f64::from(e.texels[y * w + x].dot(Vec3::new(0.2126, 0.7152, 0.0722)).max(0.0));
     let solid_angle = |y: usize| {
         let cos = |y: usize| (std::f64::consts::PI * y as f64 / h as f64).cos();
         (cos(y) - cos(y + 1)) / (2.0 * w as f64)

@@ -4,6 +4,8 @@
 //! emission (nits in glTF), intensity per steradian for point and spot lights (candela), irradiance for directional
 //! ones (lux). Colours are linear RGB with the sRGB primaries.
 
+pub mod load;
+
 use glam::{Affine3A, Mat2, Vec2, Vec3, Vec4};
 
 /// Everything a picture is computed from. Plain data: [`Scene::check`] says whether it can be rendered.
@@ -151,7 +153,14 @@ impl Material {
 
     /// A black surface that emits.
     pub fn emitter(name: &str, emission: Vec3) -> Self {
-        Self { name: name.into(), base_color: Vec3::ZERO, specular: 0.0, emission, double_sided: false, ..Self::default() }
+        Self {
+            name: name.into(),
+            base_color: Vec3::ZERO,
+            specular: 0.0,
+            emission,
+            double_sided: false,
+            ..Self::default()
+        }
     }
 }
 
@@ -186,7 +195,14 @@ pub struct Texture {
 impl Texture {
     /// The image as it is: first coordinates, repeated, bilinear.
     pub fn new(image: usize) -> Self {
-        Self { image, uv_set: 0, transform: Mat2::IDENTITY, offset: Vec2::ZERO, wrap: [Wrap::Repeat; 2], nearest: false }
+        Self {
+            image,
+            uv_set: 0,
+            transform: Mat2::IDENTITY,
+            offset: Vec2::ZERO,
+            wrap: [Wrap::Repeat; 2],
+            nearest: false,
+        }
     }
 }
 
@@ -293,6 +309,7 @@ pub enum Projection {
 
 pub mod albedo;
 pub mod bvh;
+mod camera;
 mod environment;
 mod packed;
 
