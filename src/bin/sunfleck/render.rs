@@ -9,7 +9,7 @@ use sunfleck::output::{self, Picture};
 use sunfleck::ppm::{self, Error, Film, FirstRadius, Params, RadiusSchedule, Stages};
 
 use crate::cli::RenderArgs;
-use crate::devices::{self, Opened};
+use crate::devices;
 use crate::job::{Input, Job};
 use crate::progress::{self, Progress, Status};
 use crate::report::{Device, End, Iteration, Radius, Report, Seconds, Settings};
@@ -24,17 +24,17 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode> {
     devices::use_threads(args.threads)?;
     let mut seconds = Seconds::default();
     let mut progress = Progress::new(args.quiet);
+    let device = timed(&mut seconds.open, || devices::open(args, &progress))?;
     let input = timed(&mut seconds.load, || job.load(args))?; // file → scene, camera, parameters
     input.warnings.iter().for_each(|warning| progress.say(&format!("sunfleck: warning: {}", crate::one_line(warning))));
-    let mut opened = timed(&mut seconds.prepare, || devices::open(args, &input, &progress))?; // scene → device
-    let stages = &mut *opened.stages;
+    let mut stages = timed(&mut seconds.prepare, || device.stages(&input))?; // scene → device's memory
+    let stages = &mut *stages;
     let radii = timed(&mut seconds.start, || start(stages, &input.params, job.one_radius))?; // first photons → radii
-    let mut run = Run::new(&job, args, &input, &opened, Radii::of(&radii), seconds);
+    let mut run = Run::new(&job, args, &input, device.backend(), stages, Radii::of(&radii), seconds);
     if args.verbose {
         run.describe(&input, &progress);
     }
 
-    let stages = &mut *opened.stages;
     let began = Instant::now();
     let end = loop {
         let i = run.report.iterations.len() as u32 + 1;
@@ -102,7 +102,8 @@ impl<'a> Run<'a> {
         job: &'a Job,
         args: &'a RenderArgs,
         input: &'a Input,
-        opened: &Opened,
+        backend: &'static str,
+        stages: &dyn Stages,
         radii: Radii,
         seconds: Seconds,
     ) -> Self {
@@ -111,11 +112,7 @@ impl<'a> Run<'a> {
             sunfleck: output::VERSION,
             scene: job.scene_name.clone(),
             settings: Settings::new(params, job.budget),
-            device: Device {
-                backend: opened.backend,
-                name: opened.stages.device(),
-                threads: rayon::current_num_threads(),
-            },
+            device: Device { backend, name: stages.device(), threads: rayon::current_num_threads() },
             end: End::Failed,
             error: None,
             seconds,
@@ -123,7 +120,7 @@ impl<'a> Run<'a> {
             outputs: vec![],
             iterations: vec![],
         };
-        let camera = opened.stages.camera();
+        let camera = stages.camera();
         Self { job, args, params, camera, radii, report, film: Film::default(), read: now, saved: now }
     }
 

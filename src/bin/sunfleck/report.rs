@@ -98,9 +98,11 @@ pub struct Device {
 #[derive(Debug, Default, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Seconds {
+    /// Opening the device.
+    pub open: f64,
     /// Reading the scene.
     pub load: f64,
-    /// Building its tree, opening the device.
+    /// Building its tree, and taking it to the device.
     pub prepare: f64,
     /// Choosing the first radii.
     pub start: f64,

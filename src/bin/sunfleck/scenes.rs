@@ -33,7 +33,7 @@ pub fn load(file: &Path) -> Result<(Scene, Vec<String>)> {
     {
         return Ok((scene, vec![]));
     }
-    let loaded = shim::load(file).with_context(|| file.display().to_string())?;
+    let loaded = sunfleck::scene::load::load(file)?;
     Ok((loaded.scene, loaded.warnings))
 }
 
