@@ -4,6 +4,9 @@
 //! emission (nits in glTF), intensity per steradian for point and spot lights (candela), irradiance for directional
 //! ones (lux). Colours are linear RGB with the sRGB primaries.
 
+
+pub mod shipped;
+
 use glam::{Affine3A, Mat2, Vec2, Vec3, Vec4};
 
 /// Everything a picture is computed from. Plain data: [`Scene::check`] says whether it can be rendered.

@@ -1,0 +1,1 @@
+//! The shipped scenes are what they claim to be.
