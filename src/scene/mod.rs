@@ -5,6 +5,7 @@
 //! ones (lux). Colours are linear RGB with the sRGB primaries.
 
 
+pub mod export;
 pub mod shipped;
 
 use glam::{Affine3A, Mat2, Vec2, Vec3, Vec4};

@@ -8,8 +8,7 @@ use super::shape::{Random, Shape};
 /// A cushion: a rounded box, swollen in the middle. `size` in metres, centred on x and z, standing on y = 0.
 pub fn cushion(size: Vec3, radius: f32, swell: f32) -> Shape {
     let half = 0.5 * size;
-    let shape = Shape::rounded_cuboid(-half, half, radius, 5);
-    let mut pillow = subdivided(shape, 2);
+    let mut pillow = Shape::padded_cuboid(-half, half, radius, 4, [10, 1, 10]);
     for (p, normal) in pillow.positions.iter_mut().zip(&mut pillow.normals) {
         let q = *p / half;
         let bulge = (1.0 - q.x * q.x).max(0.0) * (1.0 - q.z * q.z).max(0.0);
@@ -28,28 +27,6 @@ pub fn cushion(size: Vec3, radius: f32, swell: f32) -> Shape {
         .normalize();
     }
     pillow.moved(Vec3::Y * half.y)
-}
-
-/// Each triangle cut into four, `times` times; positions and normals are interpolated.
-fn subdivided(mut shape: Shape, times: u32) -> Shape {
-    for _ in 0..times {
-        let mut middles = std::collections::HashMap::new();
-        let mut triangles = Vec::with_capacity(4 * shape.triangles.len());
-        for [a, b, c] in std::mem::take(&mut shape.triangles) {
-            let mut middle = |i: u32, j: u32| {
-                *middles.entry((i.min(j), i.max(j))).or_insert_with(|| {
-                    let (i, j) = (i as usize, j as usize);
-                    shape.positions.push(0.5 * (shape.positions[i] + shape.positions[j]));
-                    shape.normals.push((shape.normals[i] + shape.normals[j]).normalize());
-                    shape.positions.len() as u32 - 1
-                })
-            };
-            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
-            triangles.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
-        }
-        shape.triangles = triangles;
-    }
-    shape
 }
 
 /// The upholstered parts of a sofa of `width` metres with `seats` seats, and its wooden feet.

@@ -17,7 +17,7 @@ mod tests;
 
 use glam::{Affine3A, Mat3, Vec3};
 
-use super::{Camera, Image, Material, Projection, Scene, Texture};
+use super::{Camera, Image, Material, Mesh, Projection, Scene, Sphere, Texture};
 use shape::Shape;
 
 /// The names that [`shipped`] knows.
@@ -33,6 +33,13 @@ pub fn shipped(name: &str) -> Option<Scene> {
         "fireplace" => Some(fireplace::scene()),
         _ => None,
     }
+}
+
+/// An analytic sphere as a mesh, close enough that its outline looks round.
+pub(super) fn sphere_mesh(name: &str, sphere: &Sphere) -> Mesh {
+    let shape = Shape::icosphere(sphere.centre, sphere.radius, 5);
+    let shape = if sphere.inward { shape.inverted() } else { shape };
+    shape.into_mesh(name, sphere.material)
 }
 
 /// A scene being put together.

@@ -265,7 +265,7 @@ fn things(b: &mut Builder) {
 
     let rubber = b.material(glossy("beach ball", Vec3::ONE, 0.25));
     let radius = 0.23;
-    let colors = [0xF4F1EA, 0xE03A2F, 0xF4F1EA, 0x2B6FC4, 0xF4F1EA, 0xF2B72C].map(srgb);
+    let colors = [0xE6E2DA, 0xE03A2F, 0xE6E2DA, 0x2B6FC4, 0xE6E2DA, 0xF2B72C].map(srgb);
     let n = 8;
     let mut ball = Shape::default();
     for (k, color) in colors.iter().enumerate() {
@@ -282,7 +282,7 @@ fn things(b: &mut Builder) {
         let height = radius * 0.06f32.cos();
         let disc = Profile::start(rim, height).to(rim * 0.5, height + 0.0003).to(0.0, height + 0.0004).lathe(6 * n);
         let turn = if up > 0.0 { Quat::IDENTITY } else { Quat::from_rotation_x(std::f32::consts::PI) };
-        ball.append(disc.transformed(Affine3A::from_quat(turn)).colored(srgb(0xF4F1EA)));
+        ball.append(disc.transformed(Affine3A::from_quat(turn)).colored(srgb(0xE6E2DA)));
     }
     let pose = Affine3A::from_rotation_translation(
         Quat::from_rotation_z(0.7) * Quat::from_rotation_x(0.5),

@@ -50,18 +50,20 @@ impl Shape {
         shape
     }
 
-    /// The inside of a box: six walls that face inwards.
-    pub fn room(min: Vec3, max: Vec3) -> Self {
-        Self::cuboid(min, max).inverted()
-    }
-
     /// A box whose edges and corners are rounded with `radius` in `steps` steps per eighth of a turn.
     pub fn rounded_cuboid(min: Vec3, max: Vec3, radius: f32, steps: usize) -> Self {
+        Self::padded_cuboid(min, max, radius, steps, [1; 3])
+    }
+
+    /// The same with the flat parts cut into `inner` pieces along x, y and z, for bending.
+    pub fn padded_cuboid(min: Vec3, max: Vec3, radius: f32, steps: usize, inner: [usize; 3]) -> Self {
         let (inner_min, inner_max) = (min + radius, max - radius);
         let ticks = |axis: usize| -> Vec<f32> {
             let reach = |k: usize| radius * (std::f32::consts::FRAC_PI_4 * k as f32 / steps as f32).tan();
             let mut ticks = vec![min[axis]];
             ticks.extend((0..steps).rev().map(|k| inner_min[axis] - reach(k)));
+            let n = inner[axis];
+            ticks.extend((1..n).map(|k| inner_min[axis] + (inner_max[axis] - inner_min[axis]) * k as f32 / n as f32));
             ticks.extend((0..steps).map(|k| inner_max[axis] + reach(k)));
             ticks.push(max[axis]);
             ticks
