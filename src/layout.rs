@@ -8,10 +8,7 @@ use bytemuck::{Pod, Zeroable};
 /// No such index.
 pub const NONE: u32 = u32::MAX;
 
-/// Points in one leaf of the tree over points.
-pub const LEAF_SIZE: u32 = 8;
-/// Children of an inner node of the tree over points.
-pub const FANOUT: u32 = 8;
+pub use crate::index::{FANOUT, LEAF_SIZE};
 
 /// A node of the tree over the scene's primitives: the boxes of both children, world space.
 /// `n_left == 0`: `left` is a node; otherwise `left` is the first of `n_left` primitives. Likewise on the right.

@@ -1,1 +1,12 @@
-//! To come.
+//! The GPU backend: the stages in WGSL, on any adapter with compute shaders.
+
+mod buffers;
+mod context;
+mod index;
+mod kernels;
+pub mod shaders;
+mod stages;
+mod timer;
+
+pub use context::{Choice, Context, DeviceInfo, DeviceKind, list_devices};
+pub use stages::GpuStages;

@@ -4,8 +4,8 @@
 //! emission (nits in glTF), intensity per steradian for point and spot lights (candela), irradiance for directional
 //! ones (lux). Colours are linear RGB with the sRGB primaries.
 
-
 pub mod export;
+pub mod load;
 pub mod shipped;
 
 use glam::{Affine3A, Mat2, Vec2, Vec3, Vec4};
@@ -155,7 +155,14 @@ impl Material {
 
     /// A black surface that emits.
     pub fn emitter(name: &str, emission: Vec3) -> Self {
-        Self { name: name.into(), base_color: Vec3::ZERO, specular: 0.0, emission, double_sided: false, ..Self::default() }
+        Self {
+            name: name.into(),
+            base_color: Vec3::ZERO,
+            specular: 0.0,
+            emission,
+            double_sided: false,
+            ..Self::default()
+        }
     }
 }
 
@@ -190,7 +197,14 @@ pub struct Texture {
 impl Texture {
     /// The image as it is: first coordinates, repeated, bilinear.
     pub fn new(image: usize) -> Self {
-        Self { image, uv_set: 0, transform: Mat2::IDENTITY, offset: Vec2::ZERO, wrap: [Wrap::Repeat; 2], nearest: false }
+        Self {
+            image,
+            uv_set: 0,
+            transform: Mat2::IDENTITY,
+            offset: Vec2::ZERO,
+            wrap: [Wrap::Repeat; 2],
+            nearest: false,
+        }
     }
 }
 
@@ -294,3 +308,11 @@ pub enum Projection {
         ymag: f32,
     },
 }
+
+pub mod albedo;
+pub mod bvh;
+mod camera;
+mod environment;
+mod packed;
+
+pub use packed::PackedScene;

@@ -1,1 +1,6 @@
+//! Integration tests.
 
+#[cfg(all(feature = "render", feature = "gpu"))]
+mod gpu;
+#[cfg(all(feature = "render", feature = "gpu"))]
+mod layout;

@@ -1,0 +1,119 @@
+// Density estimate at each eye vertex: the photons within its radius, found in the implicit tree.
+#import common
+#import oct
+
+@group(0) @binding(0) var<storage, read> eye_vertices: array<EyeVertex>;
+@group(0) @binding(1) var<storage, read> first_radii: array<f32>;
+@group(0) @binding(2) var<storage, read> photons: array<Photon>;
+@group(0) @binding(3) var<storage, read> boxes: array<PointBox>;
+@group(0) @binding(4) var<storage, read_write> radiance: array<vec4<f32>>;
+
+const PI: f32 = 3.14159265;
+
+// (first box, number of boxes) of a level.
+fn level_of(level: u32) -> vec2<u32> {
+    let pair = arguments.levels[level / 2u];
+    return select(pair.zw, pair.xy, (level & 1u) == 0u);
+}
+
+fn squared_distance_to_box(point: vec3<f32>, k: u32) -> f32 {
+    let d = max(max(boxes[k].min - point, point - boxes[k].max), vec3(0.0));
+    return d.x * d.x + d.y * d.y + d.z * d.z;
+}
+
+// Reads eye_vertices, first_radii, photons and boxes, writes radiance; one thread per pixel of the chunk.
+// values: pixels in the chunk, photons, levels of the tree.
+@compute @workgroup_size(64)
+fn gather(
+    @builtin(workgroup_id) workgroup: vec3<u32>,
+    @builtin(num_workgroups) workgroups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    let pixel = thread_index(workgroup, workgroups, local, 64u);
+    if pixel >= arguments.values.x {
+        return;
+    }
+    let n_photons = arguments.values.y;
+    let n_levels = arguments.values.z;
+    let vertex = eye_vertices[pixel];
+    if (vertex.flags & EYE_GATHER) == 0u || n_photons == 0u || n_levels == 0u {
+        radiance[pixel] = vec4(vertex.radiance, 0.0);
+        return;
+    }
+
+    let position = vertex.position;
+    let normal = oct_decode(vertex.normal);
+    let shading_normal = oct_decode(vertex.shading_normal);
+    let glossy = (vertex.flags & EYE_GLOSSY) != 0u;
+    let two_sided = vertex.transmission > 0.0;
+    let eye_segments = (vertex.flags >> 8u) & 0xffu;
+    let constant_kernel = (frame.flags & FRAME_CONSTANT_KERNEL) != 0u;
+    let radius = first_radii[pixel] * frame.radius_scale;
+    let radius2 = radius * radius;
+    let off_plane = 0.1 * radius;
+
+    var diffuse = vec3(0.0);
+    var other = vec3(0.0);
+    let top = n_levels - 1u;
+    var level = top;
+    var k = 0u;
+    var span = level_of(level);
+    // Each step visits another box, and there are at most span.x + 1 of them.
+    let bound = span.x + 1u;
+    for (var step = 0u; step < bound; step++) {
+        if squared_distance_to_box(position, span.x + k) <= radius2 {
+            if level > 0u {
+                level -= 1u;
+                k *= FANOUT;
+                span = level_of(level);
+                continue;
+            }
+            let end = min((k + 1u) * LEAF_SIZE, n_photons);
+            for (var i = k * LEAF_SIZE; i < end; i++) {
+                let delta = photons[i].position - position;
+                let d2 = delta.x * delta.x + delta.y * delta.y + delta.z * delta.z;
+                if d2 > radius2 {
+                    continue;
+                }
+                if abs(dot(delta, normal)) > off_plane {
+                    continue;
+                }
+                let packed = photons[i].normal_and_segments;
+                if eye_segments + (packed >> 24u) > frame.max_segments {
+                    continue;
+                }
+                let cosine = dot(normal, oct_decode24(packed));
+                if select(cosine, abs(cosine), two_sided) < 0.9 {
+                    continue;
+                }
+                let direction = oct_decode(photons[i].direction);
+                let weight = select(2.0 * (1.0 - d2 / radius2), 1.0, constant_kernel);
+                let flux = weight * photons[i].power;
+                if dot(direction, shading_normal) > 0.0 {
+                    diffuse += flux;
+                }
+                if glossy {
+                    other += flux * evaluate_glossy(vertex, shading_normal, direction);
+                }
+            }
+        }
+        // The next box in depth-first order: the sibling, or the parent's sibling after the last of eight.
+        k += 1u;
+        if k >= span.y {
+            break;
+        }
+        let up = min(countTrailingZeros(k) / 3u, top - level);
+        if up > 0u {
+            level += up;
+            k >>= 3u * up;
+            span = level_of(level);
+        }
+    }
+    let estimate = (vertex.diffuse * diffuse + other) / (PI * radius2 * f32(frame.n_paths));
+    radiance[pixel] = vec4(vertex.radiance + vertex.throughput * estimate, 0.0);
+}
+
+// All lobes but the diffuse one, 1/sr.
+fn evaluate_glossy(vertex: EyeVertex, shading_normal: vec3<f32>, direction: vec3<f32>) -> vec3<f32> {
+    return vec3(0.0);
+}

@@ -1,0 +1,326 @@
+//! Adapters and devices, their limits, and what goes wrong with them.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+
+use super::kernels::Cache;
+use crate::ppm::Error;
+
+/// What an adapter is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DeviceKind {
+    /// A graphics card.
+    Discrete,
+    /// Graphics in the processor, sharing its memory.
+    Integrated,
+    /// A part of a card, given to a virtual machine.
+    Virtual,
+    /// Software: shaders run on the processor.
+    Cpu,
+    /// The driver does not say.
+    Other,
+}
+
+impl std::fmt::Display for DeviceKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Discrete => "discrete",
+            Self::Integrated => "integrated",
+            Self::Virtual => "virtual",
+            Self::Cpu => "software",
+            Self::Other => "unknown kind",
+        })
+    }
+}
+
+/// An adapter that can be rendered with.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DeviceInfo {
+    /// For [`Choice::Index`].
+    pub index: usize,
+    /// As the driver gives it.
+    pub name: String,
+    /// Graphics interface: `vulkan`, `metal`, `dx12` or `gl`.
+    pub backend: String,
+    /// What it is.
+    pub kind: DeviceKind,
+    /// Driver and its version.
+    pub driver: String,
+}
+
+impl DeviceInfo {
+    /// Whether this is hardware.
+    pub fn is_real(&self) -> bool {
+        matches!(self.kind, DeviceKind::Discrete | DeviceKind::Integrated | DeviceKind::Virtual)
+    }
+}
+
+impl std::fmt::Display for DeviceInfo {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} ({}, {}", self.name, self.backend, self.kind)?;
+        if !self.driver.is_empty() {
+            write!(f, ", {}", self.driver)?;
+        }
+        f.write_str(")")
+    }
+}
+
+/// Which adapter to use.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Choice {
+    /// Hardware, or nothing.
+    Real,
+    /// Hardware if there is any, else software.
+    #[default]
+    Any,
+    /// By [`DeviceInfo::index`].
+    Index(usize),
+    /// The first, hardware before software, whose name contains this, whatever the case.
+    Name(String),
+}
+
+/// All adapters that can be rendered with, in the order of their indices.
+pub fn list_devices() -> Vec<DeviceInfo> {
+    adapters().into_iter().map(|(info, _)| info).collect()
+}
+
+fn adapters() -> Vec<(DeviceInfo, wgpu::Adapter)> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    // OpenGL only where there is nothing else: there it would list the same devices again.
+    let mut found = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
+    found.retain(can_compute);
+    if found.is_empty() {
+        found = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::SECONDARY));
+        found.retain(can_compute);
+    }
+    let describe = |(index, adapter): (usize, wgpu::Adapter)| {
+        let info = adapter.get_info();
+        let kind = match info.device_type {
+            wgpu::DeviceType::DiscreteGpu => DeviceKind::Discrete,
+            wgpu::DeviceType::IntegratedGpu => DeviceKind::Integrated,
+            wgpu::DeviceType::VirtualGpu => DeviceKind::Virtual,
+            wgpu::DeviceType::Cpu => DeviceKind::Cpu,
+            wgpu::DeviceType::Other => DeviceKind::Other,
+        };
+        let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
+        (DeviceInfo { index, name: info.name, backend: info.backend.to_string(), kind, driver }, adapter)
+    };
+    found.into_iter().enumerate().map(describe).collect()
+}
+
+fn can_compute(adapter: &wgpu::Adapter) -> bool {
+    adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
+        && missing_limit(&adapter.limits()).is_none()
+}
+
+/// The first of our needs that these limits do not meet.
+fn missing_limit(limits: &wgpu::Limits) -> Option<(&'static str, u64, u64)> {
+    [
+        ("storage buffers a shader", 10, u64::from(limits.max_storage_buffers_per_shader_stage)),
+        ("bytes of workgroup memory", 20 << 10, u64::from(limits.max_compute_workgroup_storage_size)),
+        ("threads a workgroup", 64, u64::from(limits.max_compute_invocations_per_workgroup)),
+        ("bytes in a storage binding", 1 << 27, limits.max_storage_buffer_binding_size),
+    ]
+    .into_iter()
+    .find(|(_, needed, allowed)| allowed < needed)
+}
+
+/// A device, and what has gone wrong with it. The GPU's errors come late and from other threads; they are kept here and
+/// returned by the next [`Context::check`].
+pub struct Context {
+    /// The device.
+    pub(super) device: wgpu::Device,
+    /// Its queue.
+    pub(super) queue: wgpu::Queue,
+    /// Its limits.
+    pub(super) limits: wgpu::Limits,
+    /// Whether timestamps can be taken between passes.
+    pub(super) timestamps: bool,
+    pub(super) kernels: Cache,
+    info: DeviceInfo,
+    failure: Arc<Mutex<Option<String>>>,
+    /// Bytes in buffers.
+    used: Arc<AtomicU64>,
+    /// Most bytes in buffers: software accepts any amount and then the machine dies.
+    budget: u64,
+}
+
+impl Context {
+    /// Opens a device.
+    pub fn new(choice: &Choice) -> Result<Self, Error> {
+        let mut found = adapters();
+        let list = || {
+            let names: Vec<String> = list_devices().iter().map(|d| format!("{}: {d}", d.index)).collect();
+            if names.is_empty() { "there is none".to_owned() } else { format!("there are {}", names.join("; ")) }
+        };
+        // Hardware before software, else in the order of the list.
+        found.sort_by_key(|(info, _)| (!info.is_real(), info.index));
+        let wanted = |info: &DeviceInfo| match choice {
+            Choice::Real => info.is_real(),
+            Choice::Any => true,
+            Choice::Index(index) => info.index == *index,
+            Choice::Name(part) => info.name.to_lowercase().contains(&part.to_lowercase()),
+        };
+        let Some((info, adapter)) = found.into_iter().find(|(info, _)| wanted(info)) else {
+            return Err(Error::NoDevice(match choice {
+                Choice::Real => format!("no hardware GPU; {}", list()),
+                Choice::Any => "no GPU adapter: no driver, or none with compute shaders".to_owned(),
+                Choice::Index(index) => format!("no GPU adapter {index}; {}", list()),
+                Choice::Name(part) => format!("no GPU adapter named \"{part}\"; {}", list()),
+            }));
+        };
+        Self::open(info, &adapter)
+    }
+
+    fn open(info: DeviceInfo, adapter: &wgpu::Adapter) -> Result<Self, Error> {
+        let limits = adapter.limits();
+        if let Some((what, needed, allowed)) = missing_limit(&limits) {
+            return Err(Error::NoDevice(format!("{info} allows {allowed} {what}, {needed} are needed")));
+        }
+        let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS;
+        let features = adapter.features() & wanted;
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("sunfleck"),
+            required_features: features,
+            required_limits: limits.clone(),
+            ..Default::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|error| Error::Device { device: info.to_string(), message: error.to_string() })?;
+
+        let failure = Arc::new(Mutex::new(None));
+        let record = |failure: &Arc<Mutex<Option<String>>>| {
+            let failure = Arc::clone(failure);
+            move |message: String| {
+                let mut first = failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+                first.get_or_insert(message);
+            }
+        };
+        let uncaptured = record(&failure);
+        device.on_uncaptured_error(Arc::new(move |error| uncaptured(error.to_string())));
+        let lost = record(&failure);
+        device.set_device_lost_callback(move |reason, message| lost(format!("device lost ({reason:?}): {message}")));
+
+        let budget = if info.is_real() { u64::MAX } else { software_budget() };
+        Ok(Self {
+            device,
+            queue,
+            limits,
+            timestamps: features == wanted,
+            kernels: Cache::default(),
+            info,
+            failure,
+            used: Arc::new(AtomicU64::new(0)),
+            budget,
+        })
+    }
+
+    /// What the device is.
+    pub fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    /// Sets the most bytes that may lie in buffers.
+    pub fn set_budget(&mut self, bytes: u64) {
+        self.budget = bytes;
+    }
+
+    /// Bytes in buffers.
+    pub fn used(&self) -> u64 {
+        self.used.load(Ordering::Relaxed)
+    }
+
+    /// Gives the device up: everything after it is an error.
+    pub fn destroy(&self) {
+        self.device.destroy();
+    }
+
+    /// The first thing that has gone wrong, if any has.
+    pub fn check(&self) -> Result<(), Error> {
+        let first = self.failure.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        match first.as_ref() {
+            None => Ok(()),
+            Some(message) => Err(self.error(message.clone())),
+        }
+    }
+
+    /// An error of this device.
+    pub(super) fn error(&self, message: String) -> Error {
+        Error::Device { device: self.info.to_string(), message }
+    }
+
+    /// Runs what only this thread does with the device, and returns what went wrong there.
+    pub(super) fn scoped<T>(&self, work: impl FnOnce() -> T) -> Result<T, wgpu::Error> {
+        let filters = [wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Validation];
+        let scopes = filters.map(|filter| self.device.push_error_scope(filter));
+        let result = work();
+        let mut first = None;
+        for scope in scopes.into_iter().rev() {
+            first = first.or(pollster::block_on(scope.pop()));
+        }
+        first.map_or(Ok(result), Err)
+    }
+
+    /// Waits until the device has done all it was given.
+    pub(super) fn wait(&self) -> Result<(), Error> {
+        let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
+        self.check()?;
+        polled.map_err(|error| self.error(error.to_string()))?;
+        Ok(())
+    }
+
+    /// A buffer of at least one byte; `bound` says how much of it one shader sees at once.
+    pub(super) fn buffer(
+        &self,
+        what: &str,
+        bytes: u64,
+        bound: u64,
+        usage: wgpu::BufferUsages,
+    ) -> Result<Buffer, Error> {
+        let bytes = bytes.max(16).next_multiple_of(16);
+        let too_large = |needed: u64, allowed: u64| Error::TooLarge {
+            what: what.to_owned(),
+            needed,
+            allowed,
+            device: self.info.to_string(),
+        };
+        if usage.contains(wgpu::BufferUsages::STORAGE) && bound > self.limits.max_storage_buffer_binding_size {
+            return Err(too_large(bound, self.limits.max_storage_buffer_binding_size));
+        }
+        if bytes > self.limits.max_buffer_size {
+            return Err(too_large(bytes, self.limits.max_buffer_size));
+        }
+        let left = self.budget.saturating_sub(self.used());
+        if bytes > left {
+            return Err(too_large(bytes, left));
+        }
+        let descriptor = wgpu::BufferDescriptor { label: Some(what), size: bytes, usage, mapped_at_creation: false };
+        let raw = self.scoped(|| self.device.create_buffer(&descriptor)).map_err(|error| match error {
+            wgpu::Error::OutOfMemory { .. } => too_large(bytes, left.min(self.limits.max_buffer_size)),
+            other => self.error(format!("{what}: {other}")),
+        })?;
+        self.used.fetch_add(bytes, Ordering::Relaxed);
+        Ok(Buffer { raw, used: Arc::clone(&self.used) })
+    }
+}
+
+/// A buffer that counts against the budget while it lives.
+pub(super) struct Buffer {
+    pub(super) raw: wgpu::Buffer,
+    used: Arc<AtomicU64>,
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        self.used.fetch_sub(self.raw.size(), Ordering::Relaxed);
+    }
+}
+
+/// Half of the memory that is free, where the system says, else 4 GiB.
+fn software_budget() -> u64 {
+    let available = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| {
+        let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?;
+        line.split_whitespace().nth(1)?.parse::<u64>().ok()
+    });
+    available.map_or(4 << 30, |kib| kib * 1024 / 2)
+}

@@ -1,0 +1,153 @@
+//! The implicit tree over photons: Morton order, radix sort, boxes level by level.
+
+use std::sync::Arc;
+
+use super::buffers::Array;
+use super::context::Context;
+use super::kernels::{Access, Arguments, Batch, Kernel, Modules};
+use crate::layout::{FANOUT, LEAF_SIZE, PointBox};
+use crate::ppm::Error;
+
+/// Photons a workgroup of `bounds.wgsl` and `sort.wgsl` handles: `BLOCK` there.
+const BLOCK: u32 = 2048;
+/// Bits of a digit in `sort.wgsl`.
+const DIGIT_BITS: u32 = 7;
+/// Digits of a 63-bit key.
+const N_PASSES: u32 = 9;
+/// Threads a workgroup.
+const THREADS: u32 = 64;
+
+/// First box and number of boxes of each level, leaves first, down to a single box; empty without points.
+pub(super) fn levels(n_points: u32) -> Vec<[u32; 2]> {
+    let mut levels = Vec::new();
+    let mut first = 0;
+    let mut n = n_points.div_ceil(LEAF_SIZE);
+    while n > 0 {
+        levels.push([first, n]);
+        first += n;
+        n = if n == 1 { 0 } else { n.div_ceil(FANOUT) };
+    }
+    levels
+}
+
+/// Kernels and memory of the build.
+pub(super) struct Index {
+    bounds_of_blocks: Arc<Kernel>,
+    bounds_of_all: Arc<Kernel>,
+    morton_keys: Arc<Kernel>,
+    sort_count: Arc<Kernel>,
+    sort_scan: Arc<Kernel>,
+    sort_scatter: Arc<Kernel>,
+    permute: Arc<Kernel>,
+    tree_leaves: Arc<Kernel>,
+    tree_level: Arc<Kernel>,
+    blocks: Array,
+    bounds: Array,
+    keys: [Array; 2],
+    order: [Array; 2],
+    counts: Array,
+    totals: Array,
+    /// All levels, leaves first.
+    pub(super) boxes: Array,
+    /// [`levels`] of the last build.
+    pub(super) levels: Vec<[u32; 2]>,
+}
+
+impl Index {
+    pub(super) fn new(modules: &Modules<'_>) -> Result<Self, Error> {
+        use Access::{Read, Write};
+        let bounds = [Read, Write, Write];
+        let sort = [Read, Read, Write, Write, Write, Write];
+        Ok(Self {
+            bounds_of_blocks: modules.kernel("bounds", "bounds_of_blocks", &bounds)?,
+            bounds_of_all: modules.kernel("bounds", "bounds_of_all", &bounds)?,
+            morton_keys: modules.kernel("morton", "morton_keys", &[Read, Read, Write, Write])?,
+            sort_count: modules.kernel("sort", "sort_count", &sort)?,
+            sort_scan: modules.kernel("sort", "sort_scan", &sort)?,
+            sort_scatter: modules.kernel("sort", "sort_scatter", &sort)?,
+            permute: modules.kernel("permute", "permute", &[Read, Read, Write])?,
+            tree_leaves: modules.kernel("tree", "tree_leaves", &[Read, Write])?,
+            tree_level: modules.kernel("tree", "tree_level", &[Read, Write])?,
+            blocks: Array::new::<PointBox>("bounds of photon blocks"),
+            bounds: Array::new::<PointBox>("bounds of the photons"),
+            keys: [Array::new::<[u32; 2]>("sort keys"), Array::new::<[u32; 2]>("sort keys")],
+            order: [Array::new::<u32>("sort order"), Array::new::<u32>("sort order")],
+            counts: Array::new::<u32>("sort counts"),
+            totals: Array::new::<u32>("sort totals"),
+            boxes: Array::new::<PointBox>("boxes of the tree over photons"),
+            levels: Vec::new(),
+        })
+    }
+
+    /// Makes room for `n` photons.
+    pub(super) fn reserve(&mut self, context: &Context, n: u32) -> Result<(), Error> {
+        // A little more than asked, for the number changes from one iteration to the next.
+        let n = u64::from(n);
+        let roomy = n + n / 16;
+        let room = |array: &mut Array, needed: u64, roomy: u64| {
+            if array.capacity() >= needed.max(1) { Ok(()) } else { array.reserve(context, roomy.max(1)) }
+        };
+        let n_blocks = |n: u64| n.div_ceil(u64::from(BLOCK));
+        let n_boxes = |n: u64| levels(n as u32).last().map_or(1, |[first, n]| u64::from(first + n));
+        room(&mut self.blocks, n_blocks(n), n_blocks(roomy))?;
+        room(&mut self.bounds, 1, 1)?;
+        for i in 0..2 {
+            room(&mut self.keys[i], n, roomy)?;
+            room(&mut self.order[i], n, roomy)?;
+        }
+        let digits = 1 << DIGIT_BITS;
+        room(&mut self.counts, digits * n_blocks(n), digits * n_blocks(roomy))?;
+        room(&mut self.totals, digits, digits)?;
+        room(&mut self.boxes, n_boxes(n), n_boxes(roomy))
+    }
+
+    /// Records the sort of `n` photons into `sorted`, and the tree over them. Call [`Index::reserve`] first.
+    pub(super) fn build(&mut self, batch: &mut Batch<'_>, n: u32, photons: &Array, sorted: &Array) {
+        self.levels = levels(n);
+        if n == 0 {
+            return;
+        }
+        let n_blocks = n.div_ceil(BLOCK);
+        let groups = n.div_ceil(THREADS);
+        let bounds = [photons.all(), self.blocks.all(), self.bounds.all()];
+        batch.dispatch(&self.bounds_of_blocks, &bounds, [n, 0, 0, 0], n_blocks);
+        batch.dispatch(&self.bounds_of_all, &bounds, [n, 0, 0, 0], 1);
+        let morton = [photons.all(), self.bounds.all(), self.keys[0].all(), self.order[0].all()];
+        batch.dispatch(&self.morton_keys, &morton, [n, 0, 0, 0], groups);
+
+        for pass in 0..N_PASSES {
+            let (from, to) = ((pass % 2) as usize, (1 - pass % 2) as usize);
+            let buffers = [
+                self.keys[from].all(),
+                self.order[from].all(),
+                self.keys[to].all(),
+                self.order[to].all(),
+                self.counts.all(),
+                self.totals.all(),
+            ];
+            let arguments = [n, pass * DIGIT_BITS, n_blocks, 0];
+            batch.dispatch(&self.sort_count, &buffers, arguments, n_blocks);
+            batch.dispatch(&self.sort_scan, &buffers, arguments, 1 << DIGIT_BITS);
+            batch.dispatch(&self.sort_scatter, &buffers, arguments, n_blocks);
+        }
+        let last = (N_PASSES % 2) as usize;
+        batch.dispatch(&self.permute, &[self.order[last].all(), photons.all(), sorted.all()], [n, 0, 0, 0], groups);
+
+        let tree = [sorted.all(), self.boxes.all()];
+        batch.dispatch(&self.tree_leaves, &tree, [n, self.levels[0][1], 0, 0], self.levels[0][1].div_ceil(THREADS));
+        for pair in self.levels.windows(2) {
+            let ([below, n_below], [first, n]) = (pair[0], pair[1]);
+            batch.dispatch(&self.tree_level, &tree, [below, n_below, first, n], n.div_ceil(THREADS));
+        }
+    }
+
+    /// The levels for a dispatch that walks the tree; `values[2]` becomes their number.
+    pub(super) fn arguments(&self, values: [u32; 4]) -> Arguments {
+        let mut arguments = Arguments::from(values);
+        arguments.values[2] = self.levels.len() as u32;
+        for (to, from) in arguments.levels.iter_mut().zip(&self.levels) {
+            *to = *from;
+        }
+        arguments
+    }
+}

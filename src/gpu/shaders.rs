@@ -1,0 +1,58 @@
+//! The WGSL sources and their composition: a line `#import name` stands for the file of that name, once.
+
+/// Everything that can be imported: name and text.
+const LIBRARY: &[(&str, &str)] = &[
+    ("layout", include_str!("../../shaders/layout.wgsl")),
+    ("common", include_str!("../../shaders/lib/common.wgsl")),
+    ("oct", include_str!("../../shaders/lib/oct.wgsl")),
+];
+
+/// Every module with entry points: name and text before composition.
+const MODULES: &[(&str, &str)] = &[
+    ("bounds", include_str!("../../shaders/bounds.wgsl")),
+    ("morton", include_str!("../../shaders/morton.wgsl")),
+    ("sort", include_str!("../../shaders/sort.wgsl")),
+    ("permute", include_str!("../../shaders/permute.wgsl")),
+    ("tree", include_str!("../../shaders/tree.wgsl")),
+    ("gather", include_str!("../../shaders/gather.wgsl")),
+    ("accumulate", include_str!("../../shaders/accumulate.wgsl")),
+];
+
+/// Names of all modules with entry points.
+pub fn modules() -> impl Iterator<Item = &'static str> {
+    MODULES.iter().map(|(name, _)| *name)
+}
+
+/// Complete WGSL of a module.
+///
+/// # Panics
+/// If there is no such module, or it imports what does not exist: a mistake in this crate.
+pub fn source(module: &str) -> String {
+    let (_, text) = MODULES.iter().find(|(name, _)| *name == module).expect("a module of this crate");
+    compose(text)
+}
+
+/// Replaces the imports of a text by what they name, each one once.
+///
+/// # Panics
+/// If it imports what does not exist.
+pub fn compose(text: &str) -> String {
+    let mut composed = String::new();
+    append(text, &mut Vec::new(), &mut composed);
+    composed
+}
+
+fn append(text: &str, seen: &mut Vec<&'static str>, composed: &mut String) {
+    for line in text.lines() {
+        let Some(wanted) = line.strip_prefix("#import ") else {
+            composed.push_str(line);
+            composed.push('\n');
+            continue;
+        };
+        let (name, imported) = LIBRARY.iter().find(|(name, _)| *name == wanted.trim()).expect("a file of the library");
+        if !seen.contains(name) {
+            seen.push(name);
+            append(imported, seen, composed);
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! The stages of an iteration on a GPU.
+
+use std::sync::Arc;
+
+use super::buffers::{Array, Readback};
+use super::context::Context;
+use super::index::Index;
+use super::kernels::{Access, Batch, Kernel, Modules, Shared};
+use super::timer::{Stage, Timer};
+use crate::layout::{Camera, EyeVertex, Frame, Photon, PointBox};
+use crate::ppm::{Error, Film, StageTimes, Stages};
+
+/// Threads a workgroup.
+const THREADS: u32 = 64;
+/// Pixels are cut at multiples of this, so that the address of any part of a per-pixel array is aligned.
+const PIXEL_STEP: u32 = 4096;
+/// Pixels of the first gather dispatch, before anything is known about the device's speed.
+const FIRST_CHUNK: u32 = 65536;
+/// Seconds a dispatch may take, well below what watchdogs allow.
+const DISPATCH_SECONDS: f64 = 0.1;
+
+/// The GPU backend.
+pub struct GpuStages {
+    context: Arc<Context>,
+    shared: Shared,
+    camera: Camera,
+    index: Index,
+    gather: Arc<Kernel>,
+    accumulate: Arc<Kernel>,
+    eye_vertices: Array,
+    first_radii: Array,
+    radiance: Array,
+    film: Array,
+    photons: Array,
+    /// The other half of a pair: photons before or after sorting.
+    other_photons: Array,
+    readback: Readback,
+    timer: Timer,
+    n_pixels: u32,
+    n_photons: u32,
+    film_size: [u32; 2],
+    n_iterations: u32,
+    /// Pixels a gather dispatch handles.
+    gather_chunk: u32,
+}
+
+impl GpuStages {
+    /// To come: the scene.
+    pub fn new(context: Arc<Context>, camera: Camera) -> Result<Self, Error> {
+        use Access::{Read, Write};
+        let shared = Shared::new(&context);
+        let modules = Modules::new(&context, &shared);
+        let index = Index::new(&modules)?;
+        let gather = modules.kernel("gather", "gather", &[Read, Read, Read, Read, Write])?;
+        let accumulate = modules.kernel("accumulate", "accumulate", &[Read, Write])?;
+        let timer = Timer::new(&context);
+        Ok(Self {
+            context,
+            shared,
+            camera,
+            index,
+            gather,
+            accumulate,
+            eye_vertices: Array::in_ranges::<EyeVertex>("eye vertices"),
+            first_radii: Array::in_ranges::<f32>("first radii"),
+            radiance: Array::in_ranges::<[f32; 4]>("radiance"),
+            film: Array::in_ranges::<[f32; 4]>("film"),
+            photons: Array::new::<Photon>("photons"),
+            other_photons: Array::new::<Photon>("photons in tree order"),
+            readback: Readback::default(),
+            timer,
+            n_pixels: 0,
+            n_photons: 0,
+            film_size: [0, 0],
+            n_iterations: 0,
+            gather_chunk: FIRST_CHUNK,
+        })
+    }
+
+    /// Room for the film's pixels.
+    fn reserve_pixels(&mut self, n: u32) -> Result<(), Error> {
+        for array in [&mut self.eye_vertices, &mut self.first_radii, &mut self.radiance, &mut self.film] {
+            array.reserve(&self.context, u64::from(n))?;
+        }
+        self.n_pixels = n;
+        Ok(())
+    }
+
+    /// Parts of the film, pixels: first and number.
+    fn chunks(n_pixels: u32, chunk: u32) -> impl Iterator<Item = (u32, u32)> {
+        (0..n_pixels).step_by(chunk as usize).map(move |first| (first, chunk.min(n_pixels - first)))
+    }
+
+    /// The boxes of the tree, all levels, leaves first.
+    pub fn tree(&mut self) -> Result<Vec<PointBox>, Error> {
+        let n = self.index.levels.last().map_or(0, |[first, n]| first + n);
+        self.read(Source::Boxes, n)
+    }
+
+    fn read<T: bytemuck::Pod>(&mut self, source: Source, n: u32) -> Result<Vec<T>, Error> {
+        if n == 0 {
+            return Ok(Vec::new());
+        }
+        let array = match source {
+            Source::Eye => &self.eye_vertices,
+            Source::Photons => &self.photons,
+            Source::Radiance => &self.radiance,
+            Source::Film => &self.film,
+            Source::Boxes => &self.index.boxes,
+        };
+        self.readback.read(&self.context, &self.shared, array.raw(), n as usize)
+    }
+
+    fn check_pixels(&self, frame: &Frame) -> Result<u32, Error> {
+        let n = frame.width * frame.height;
+        if n == self.n_pixels {
+            return Ok(n);
+        }
+        Err(self.context.error(format!("{n} pixels are asked for, {} have eye vertices", self.n_pixels)))
+    }
+}
+
+/// What can be read back.
+#[derive(Clone, Copy)]
+enum Source {
+    Eye,
+    Photons,
+    Radiance,
+    Film,
+    Boxes,
+}
+
+impl Stages for GpuStages {
+    fn device(&self) -> String {
+        self.context.info().to_string()
+    }
+
+    fn camera(&self) -> Camera {
+        self.camera
+    }
+
+    fn trace_eye(&mut self, _frame: &Frame) -> Result<(), Error> {
+        Err(self.context.error("eye paths are still to come".to_owned()))
+    }
+
+    fn trace_photons(&mut self, _frame: &Frame) -> Result<(), Error> {
+        Err(self.context.error("photon paths are still to come".to_owned()))
+    }
+
+    fn build_index(&mut self, frame: &Frame) -> Result<(), Error> {
+        let n = self.n_photons;
+        self.photons.reserve(&self.context, u64::from(n))?;
+        self.other_photons.reserve(&self.context, self.photons.capacity())?;
+        self.index.reserve(&self.context, n)?;
+        self.shared.set_frame(&self.context, frame);
+        let mut batch = Batch::new(&self.context, &self.shared, "build");
+        self.timer.begin(Stage::Build, &mut batch);
+        self.index.build(&mut batch, n, &self.photons, &self.other_photons);
+        self.timer.end(Stage::Build, batch, &self.context)?;
+        std::mem::swap(&mut self.photons, &mut self.other_photons);
+        Ok(())
+    }
+
+    fn gather(&mut self, frame: &Frame) -> Result<(), Error> {
+        let n_pixels = self.check_pixels(frame)?;
+        self.index.reserve(&self.context, 0)?;
+        self.photons.reserve(&self.context, 0)?;
+        self.shared.set_frame(&self.context, frame);
+        let mut batch = Batch::new(&self.context, &self.shared, "gather");
+        self.timer.begin(Stage::Gather, &mut batch);
+        for (first, n) in Self::chunks(n_pixels, self.gather_chunk) {
+            if first > 0 {
+                batch.submit()?;
+                batch = Batch::new(&self.context, &self.shared, "gather");
+            }
+            let buffers = [
+                self.eye_vertices.range(first, n),
+                self.first_radii.range(first, n),
+                self.photons.all(),
+                self.index.boxes.all(),
+                self.radiance.range(first, n),
+            ];
+            let arguments = self.index.arguments([n, self.n_photons, 0, 0]);
+            batch.dispatch(&self.gather, &buffers, arguments, n.div_ceil(THREADS));
+        }
+        self.timer.end(Stage::Gather, batch, &self.context)
+    }
+
+    fn accumulate(&mut self, frame: &Frame) -> Result<(), Error> {
+        let n_pixels = self.check_pixels(frame)?;
+        self.shared.set_frame(&self.context, frame);
+        let mut batch = Batch::new(&self.context, &self.shared, "accumulate");
+        self.timer.begin(Stage::Accumulate, &mut batch);
+        if frame.iteration <= 1 {
+            batch.encoder().clear_buffer(self.film.raw(), 0, None);
+        }
+        for (first, n) in Self::chunks(n_pixels, 1 << 20) {
+            let buffers = [self.radiance.range(first, n), self.film.range(first, n)];
+            batch.dispatch(&self.accumulate, &buffers, [n, 0, 0, 0], n.div_ceil(THREADS));
+        }
+        self.timer.end(Stage::Accumulate, batch, &self.context)?;
+        self.film_size = [frame.width, frame.height];
+        self.n_iterations = frame.iteration;
+        Ok(())
+    }
+
+    fn set_first_radii(&mut self, radii: &[f32]) -> Result<(), Error> {
+        self.reserve_pixels(radii.len() as u32)?;
+        self.first_radii.write(&self.context, radii)
+    }
+
+    fn eye_vertices(&mut self) -> Result<Vec<EyeVertex>, Error> {
+        self.read(Source::Eye, self.n_pixels)
+    }
+
+    fn set_eye_vertices(&mut self, vertices: &[EyeVertex]) -> Result<(), Error> {
+        self.reserve_pixels(vertices.len() as u32)?;
+        self.eye_vertices.write(&self.context, vertices)
+    }
+
+    fn photons(&mut self) -> Result<Vec<Photon>, Error> {
+        self.read(Source::Photons, self.n_photons)
+    }
+
+    fn set_photons(&mut self, photons: &[Photon]) -> Result<(), Error> {
+        self.photons.write(&self.context, photons)?;
+        self.n_photons = photons.len() as u32;
+        Ok(())
+    }
+
+    fn radiance(&mut self) -> Result<Vec<[f32; 3]>, Error> {
+        let pixels = self.read::<[f32; 4]>(Source::Radiance, self.n_pixels)?;
+        Ok(pixels.iter().map(|p| [p[0], p[1], p[2]]).collect())
+    }
+
+    fn film(&mut self) -> Result<Film, Error> {
+        let [width, height] = self.film_size;
+        let pixels = self.read(Source::Film, width * height)?;
+        Ok(Film { width, height, n_iterations: self.n_iterations, pixels })
+    }
+
+    fn n_photons(&self) -> u32 {
+        self.n_photons
+    }
+
+    fn times(&mut self) -> Result<StageTimes, Error> {
+        let times = self.timer.read(&self.context, &self.shared, &mut self.readback)?;
+        if times.gather > 0.0 {
+            let pixels = f64::from(self.n_pixels) * DISPATCH_SECONDS / times.gather;
+            let steps = (pixels / f64::from(PIXEL_STEP)).clamp(1.0, 256.0) as u32;
+            self.gather_chunk = steps * PIXEL_STEP;
+        }
+        Ok(times)
+    }
+}

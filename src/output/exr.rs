@@ -1,0 +1,281 @@
+//! OpenEXR: scene-linear 32-bit float, with what is needed to make the picture again in the header.
+//!
+//! | attribute | type | |
+//! |---|---|---|
+//! | `dataWindow`, `displayWindow` | box | the part computed, in the whole picture |
+//! | `chromaticities` | | sRGB's (ITU-R BT.709, D65) |
+//! | `software`, `sunfleckVersion` | string | `Sunfleck 0.1.0 (commit)`; version and commit alone |
+//! | `adapter`, `scene`, `command` | string | device, SCENE as given, the whole command line |
+//! | `seed`, `iterations`, `photonsPerIteration` | int | double where above 2³¹ − 1; photon *paths* |
+//! | `samplesPerPixel` | int | `iterations`, under the name that other tools read |
+//! | `alpha`, `firstRadius`, `lastRadius` | float | metres; the median where each pixel has its own |
+//! | `renderTimeSeconds` | float | from the first iteration to the last |
+//! | `capDate`, `utcOffset` | | when it was saved, UTC |
+//! | `worldToCamera` | m44f | row vectors, as in Imath: p·M; +x right, +y up, looking along −z |
+//!
+//! Channels: `R`, `G`, `B`, and on request `Variance.Y`, the estimated variance of the pixel's luminance.
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::{self, BufReader};
+use std::path::Path;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use ::exr::meta::attribute::{AttributeValue, Chromaticities, IntegerBounds, Text};
+use ::exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, ImageAttributes, Layer, LayerAttributes, ReadChannels, ReadLayers,
+    Vec2, WritableImage,
+};
+use glam::{Mat4, Vec3, Vec4};
+
+use super::{Error, Picture, VERSION, atomic};
+use crate::layout::Camera;
+
+/// Where a picture came from.
+#[derive(Clone, Debug, Default)]
+pub struct Header {
+    /// As given.
+    pub scene: String,
+    /// The command line.
+    pub command: String,
+    /// Device that computed it.
+    pub adapter: String,
+    /// Of the random numbers.
+    pub seed: u32,
+    /// Of the radius schedule.
+    pub alpha: f32,
+    /// Of the first iteration, metres; the median over the pixels.
+    pub first_radius: f32,
+    /// Of the last iteration, metres, likewise.
+    pub last_radius: f32,
+    /// In the mean.
+    pub iterations: u32,
+    /// Photon paths emitted an iteration.
+    pub photons_per_iteration: u32,
+    /// Wall clock.
+    pub seconds: f64,
+    /// The camera.
+    pub camera: Camera,
+}
+
+/// Largest picture that [`read`] takes, pixels: 3 GiB of linear RGB.
+pub const MAX_READ_PIXELS: u64 = 1 << 28;
+
+/// Writes `picture`, losslessly compressed.
+pub fn write(path: &Path, picture: &Picture, header: &Header) -> Result<(), Error> {
+    let [width, height] = picture.crop_size();
+    let channel = |name: &str, samples: Vec<f32>| AnyChannel::new(name, FlatSamples::F32(samples));
+    let mut channels: Vec<_> = ["R", "G", "B"]
+        .into_iter()
+        .enumerate()
+        .map(|(c, name)| channel(name, picture.rgb.iter().map(|rgb| rgb[c]).collect()))
+        .collect();
+    channels.extend(picture.variance.iter().map(|v| channel("Variance.Y", v.clone())));
+    let layer = Layer::new(
+        (width, height),
+        layer_attributes(picture, header),
+        Encoding::SMALL_LOSSLESS,
+        AnyChannels::sort(channels.into()),
+    );
+    let mut image = ::exr::prelude::Image::from_layer(layer);
+    image.attributes = ImageAttributes {
+        display_window: IntegerBounds::from_dimensions((picture.size[0] as usize, picture.size[1] as usize)),
+        chromaticities: Some(Chromaticities {
+            red: Vec2(0.64, 0.33),
+            green: Vec2(0.30, 0.60),
+            blue: Vec2(0.15, 0.06),
+            white: Vec2(0.3127, 0.3290),
+        }),
+        ..image.attributes
+    };
+    atomic::write(path, |writer| image.write().to_buffered(writer).map_err(to_io))
+}
+
+fn layer_attributes(picture: &Picture, header: &Header) -> LayerAttributes {
+    // OpenEXR's strings are UTF-8; the crate's checked constructors refuse all but Latin-1.
+    let text = |s: &str| Text::from_slice_unchecked(s.as_bytes());
+    let count = |n: u32| i32::try_from(n).map_or(AttributeValue::F64(f64::from(n)), AttributeValue::I32);
+    let other: HashMap<Text, AttributeValue> = [
+        ("sunfleckVersion", AttributeValue::Text(text(VERSION))),
+        ("scene", AttributeValue::Text(text(&header.scene))),
+        ("command", AttributeValue::Text(text(&header.command))),
+        ("adapter", AttributeValue::Text(text(&header.adapter))),
+        ("seed", count(header.seed)),
+        ("iterations", count(header.iterations)),
+        ("samplesPerPixel", count(header.iterations)),
+        ("photonsPerIteration", count(header.photons_per_iteration)),
+        ("alpha", AttributeValue::F32(header.alpha)),
+        ("firstRadius", AttributeValue::F32(header.first_radius)),
+        ("lastRadius", AttributeValue::F32(header.last_radius)),
+        ("renderTimeSeconds", AttributeValue::F32(header.seconds as f32)),
+    ]
+    .map(|(name, value)| (text(name), value))
+    .into();
+    LayerAttributes {
+        layer_position: Vec2(picture.crop[0] as i32, picture.crop[1] as i32),
+        software_name: Some(text(&format!("Sunfleck {VERSION}"))),
+        capture_date: Some(text(&utc_date(SystemTime::now()))),
+        utc_offset: Some(0.0),
+        world_to_camera: Some(camera_from_world(&header.camera).to_cols_array()),
+        other,
+        ..LayerAttributes::default()
+    }
+}
+
+/// Column-major for column vectors, which is row-major for Imath's row vectors.
+fn camera_from_world(camera: &Camera) -> Mat4 {
+    let axis = |v: [f32; 3], w| Vec4::from((Vec3::from(v), w));
+    let world_from_camera = Mat4::from_cols(
+        axis(camera.right, 0.0),
+        axis(camera.up, 0.0),
+        axis(camera.forward.map(|c| -c), 0.0),
+        axis(camera.position, 1.0),
+    );
+    if world_from_camera.determinant() == 0.0 { Mat4::IDENTITY } else { world_from_camera.inverse() }
+}
+
+/// "YYYY:MM:DD hh:mm:ss", UTC, as `capDate` wants it.
+fn utc_date(time: SystemTime) -> String {
+    let seconds = time.duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
+    let (mut day, second) = (seconds / 86_400, seconds % 86_400);
+    let leap = |y: u64| y.is_multiple_of(4) && (!y.is_multiple_of(100) || y.is_multiple_of(400));
+    let mut year = 1970;
+    while day >= 365 + u64::from(leap(year)) {
+        day -= 365 + u64::from(leap(year));
+        year += 1;
+    }
+    let mut month = 0;
+    let lengths = [31, 28 + u64::from(leap(year)), 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
+    while day >= lengths[month] {
+        day -= lengths[month];
+        month += 1;
+    }
+    let (hour, minute, second) = (second / 3600, second / 60 % 60, second % 60);
+    format!("{year:04}:{:02}:{:02} {hour:02}:{minute:02}:{second:02}", month + 1, day + 1)
+}
+
+fn to_io(error: ::exr::error::Error) -> io::Error {
+    match error {
+        ::exr::error::Error::Io(e) => e,
+        e => io::Error::other(e.to_string()),
+    }
+}
+
+/// Reads the first layer with channels `R`, `G` and `B` in full size, whoever wrote it.
+pub fn read(path: &Path) -> Result<Picture, Error> {
+    let fail = |reason: &dyn std::fmt::Display| Error::read(path, reason);
+    let kind = std::fs::metadata(path).map_err(|e| fail(&e))?;
+    if !kind.is_file() {
+        return Err(fail(&"not a regular file"));
+    }
+    let meta = ::exr::meta::MetaData::read_from_file(path, false).map_err(|e| fail(&e))?;
+    let pixels = |h: &::exr::meta::header::Header| h.layer_size.0 as u64 * h.layer_size.1 as u64;
+    if let Some(large) = meta.headers.iter().map(pixels).find(|&n| n > MAX_READ_PIXELS) {
+        return Err(fail(&format_args!("{large} pixels, more than {MAX_READ_PIXELS}")));
+    }
+    let image = ::exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgb_channels(
+            |size, _| Plane { width: size.0, rgb: vec![[0.0; 3]; size.0 * size.1] },
+            |plane: &mut Plane, at, (r, g, b): (f32, f32, f32)| plane.rgb[at.1 * plane.width + at.0] = [r, g, b],
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(BufReader::new(File::open(path).map_err(|e| fail(&e))?))
+        .map_err(|e| fail(&e))?;
+    let (display, layer) = (image.attributes.display_window, image.layer_data);
+    // A data window may begin above or left of the display window: count from its own corner then.
+    let corner = |at: i32, origin: i32| u32::try_from(i64::from(at) - i64::from(origin)).unwrap_or(0);
+    let x0 = corner(layer.attributes.layer_position.0, display.position.0);
+    let y0 = corner(layer.attributes.layer_position.1, display.position.1);
+    let crop = [x0, y0, x0 + layer.size.0 as u32, y0 + layer.size.1 as u32];
+    let size = [display.size.0 as u32, display.size.1 as u32];
+    Ok(Picture { size, crop, rgb: layer.channel_data.pixels.rgb, variance: None })
+}
+
+struct Plane {
+    width: usize,
+    rgb: Vec<[f32; 3]>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    fn picture() -> Picture {
+        Picture {
+            size: [20, 10],
+            crop: [3, 2, 8, 6],
+            rgb: (0..20).map(|i| [i as f32, 1e-30 * i as f32, -0.5]).collect(),
+            variance: Some((0..20).map(|i| i as f32).collect()),
+        }
+    }
+
+    #[test]
+    fn reads_back_bit_for_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        write(&path, &picture(), &Header::default()).unwrap();
+        assert_eq!(read(&path).unwrap(), Picture { variance: None, ..picture() });
+    }
+
+    #[test]
+    fn the_header_says_where_it_came_from() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let camera = Camera {
+            right: [0.0, 0.0, -1.0],
+            up: [0.0, 1.0, 0.0],
+            forward: [-1.0, 0.0, 0.0],
+            position: [5.0, 1.0, 0.0],
+            ..Camera::default()
+        };
+        let header = Header {
+            scene: "söne".into(),
+            adapter: "llvmpipe".into(),
+            seed: u32::MAX,
+            alpha: 0.5,
+            first_radius: 0.25,
+            last_radius: 0.125,
+            iterations: 7,
+            photons_per_iteration: 500_000,
+            seconds: 2.5,
+            camera,
+            ..Header::default()
+        };
+        write(&path, &picture(), &header).unwrap();
+        let meta = ::exr::meta::MetaData::read_from_file(&path, true).unwrap();
+        let own = &meta.headers[0].own_attributes;
+        let get = |name: &str| own.other[&Text::from(name)].clone();
+        assert_eq!(get("seed"), AttributeValue::F64(f64::from(u32::MAX)));
+        assert_eq!(get("iterations"), AttributeValue::I32(7));
+        assert_eq!(get("photonsPerIteration"), AttributeValue::I32(500_000));
+        assert_eq!(get("alpha"), AttributeValue::F32(0.5));
+        assert_eq!(get("lastRadius"), AttributeValue::F32(0.125));
+        assert_eq!(get("sunfleckVersion"), AttributeValue::Text(Text::from(VERSION)));
+        let m = Mat4::from_cols_array(&own.world_to_camera.unwrap());
+        assert_eq!(m.transform_point3(Vec3::new(5.0, 1.0, 0.0)), Vec3::ZERO);
+        assert_eq!(m.transform_point3(Vec3::new(3.0, 1.0, 0.0)), Vec3::new(0.0, 0.0, -2.0));
+        assert_eq!(meta.headers[0].shared_attributes.display_window.size, Vec2(20, 10));
+        assert_eq!(own.layer_position, Vec2(3, 2));
+    }
+
+    #[test]
+    fn dates() {
+        let at = |s| utc_date(UNIX_EPOCH + Duration::from_secs(s));
+        assert_eq!(at(0), "1970:01:01 00:00:00");
+        assert_eq!(at(951_782_400), "2000:02:29 00:00:00");
+        assert_eq!(at(1_735_689_599), "2024:12:31 23:59:59");
+    }
+
+    #[test]
+    fn other_files_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        assert!(read(&path).unwrap_err().to_string().starts_with("cannot read "));
+        std::fs::write(&path, "not an image").unwrap();
+        assert!(read(&path).is_err());
+    }
+}

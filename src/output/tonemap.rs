@@ -1,0 +1,181 @@
+//! From scene-linear radiance to what a display shows: exposure, a tone curve, the sRGB encoding.
+//!
+//! All functions take and give linear RGB with the sRGB primaries (ITU-R BT.709, D65 white).
+
+use crate::ppm::film::luminance;
+
+/// How radiance above what a display can show is brought down.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ToneMap {
+    /// Khronos PBR Neutral (2024): colours below 0.76 stay as they are, highlights are compressed and desaturated.
+    #[default]
+    Neutral,
+    /// AgX (Troy Sobotka, 2022): film-like; bright saturated colours fade to white.
+    Agx,
+    /// None: values above 1 are cut off.
+    Srgb,
+}
+
+impl ToneMap {
+    /// Exposed radiance to display-linear RGB in [0, 1]. NaN and negative values count as 0.
+    pub fn apply(self, rgb: [f32; 3]) -> [f32; 3] {
+        let rgb = rgb.map(|c| c.max(0.0).min(1e9)); // max() turns NaN into 0
+        let mapped = match self {
+            Self::Neutral => neutral(rgb),
+            Self::Agx => agx(rgb),
+            Self::Srgb => rgb,
+        };
+        mapped.map(|c| c.clamp(0.0, 1.0))
+    }
+}
+
+/// "Khronos PBR Neutral Tone Mapper" specification, version 1.
+fn neutral(rgb: [f32; 3]) -> [f32; 3] {
+    const F90: f32 = 0.04; // Reflection of a dielectric at normal incidence, taken off again.
+    const START: f32 = 0.8 - F90;
+    const DESATURATION: f32 = 0.15;
+    let lowest = rgb[0].min(rgb[1]).min(rgb[2]);
+    let offset = if lowest < 2.0 * F90 { lowest - lowest * lowest / (4.0 * F90) } else { F90 };
+    let rgb = rgb.map(|c| c - offset);
+    let peak = rgb[0].max(rgb[1]).max(rgb[2]);
+    if peak < START {
+        return rgb;
+    }
+    let room = 1.0 - START;
+    let compressed = 1.0 - room * room / (peak + room - START);
+    let keep = 1.0 / (DESATURATION * (peak - compressed) + 1.0);
+    rgb.map(|c| compressed + (c * (compressed / peak) - compressed) * keep)
+}
+
+/// AgX's base look: primaries drawn in by a fifth towards white, a logarithm over 16.5 stops, a sigmoid per channel.
+fn agx(rgb: [f32; 3]) -> [f32; 3] {
+    /// Moving the chromaticities of all three primaries the share `INSET` towards the white point is, for linear RGB,
+    /// c ↦ (1 − INSET)·c + w·c with these weights; their sum is INSET, so white stays.
+    const INSET: f32 = 0.2;
+    const WEIGHTS: [f32; 3] = [0.042_398_93, 0.078_430_165, 0.079_170_905];
+    const LOWEST: f32 = -10.0; // Stops about mid grey.
+    const HIGHEST: f32 = 6.5;
+    let weigh = |c: [f32; 3]| c[0] * WEIGHTS[0] + c[1] * WEIGHTS[1] + c[2] * WEIGHTS[2];
+
+    let white = weigh(rgb);
+    let curved = rgb.map(|c| {
+        let stops = (((1.0 - INSET) * c + white) / 0.18).max(1e-10).log2();
+        agx_curve(((stops - LOWEST) / (HIGHEST - LOWEST)).clamp(0.0, 1.0), -LOWEST / (HIGHEST - LOWEST))
+    });
+    // The way back: `white` of the inset colour is white·(1 − INSET) + white·INSET, itself.
+    let white = weigh(curved);
+    curved.map(|c| ((c - white) / (1.0 - INSET)).max(0.0).powf(2.2))
+}
+
+/// Sigmoid through (0, 0), (`pivot`, ½) with slope 2, and (1, 1): on each side u ↦ s·u/(1 + (s·u/k)^p)^(1/p) about the
+/// pivot, with k such that it reaches its end.
+fn agx_curve(x: f32, pivot: f32) -> f32 {
+    const SLOPE: f32 = 2.0;
+    const MIDDLE: f32 = 0.5;
+    let (sign, power, run) = if x < pivot { (-1.0, 3.0, pivot) } else { (1.0, 3.25, 1.0 - pivot) };
+    let reach = SLOPE * run; // What a straight line would reach.
+    let k = reach / ((reach / MIDDLE).powf(power) - 1.0).powf(1.0 / power);
+    let u = SLOPE * (x - pivot).abs();
+    MIDDLE + sign * u / (1.0 + (u / k).powf(power)).powf(1.0 / power)
+}
+
+/// IEC 61966-2-1: display-linear to encoded, both in [0, 1].
+pub fn srgb_encode(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// Automatic exposure, stops: brings the picture's log-average luminance to mid grey, 0.18 (Reinhard et al. 2002).
+///
+/// The average is over lit pixels, those brighter than 2⁻¹² of the 98th percentile of what is above 0, with everything
+/// above that percentile cut off there: neither a black background nor a few fireflies nor a lamp in view move it. A
+/// black picture gets 0.
+pub fn automatic_exposure(rgb: &[[f32; 3]]) -> f32 {
+    let mut lit: Vec<f32> = rgb.iter().map(|&c| luminance(c)).filter(|y| *y > 0.0 && y.is_finite()).collect();
+    if lit.is_empty() {
+        return 0.0;
+    }
+    let at = (lit.len() - 1) * 98 / 100;
+    let bright = *lit.select_nth_unstable_by(at, f32::total_cmp).1;
+    let (mut sum, mut n) = (0.0, 0u32);
+    for y in lit.into_iter().filter(|&y| y > bright / 4096.0) {
+        sum += f64::from(y.min(bright)).log2();
+        n += 1;
+    }
+    (0.18f64.log2() - sum / f64::from(n)).clamp(-60.0, 60.0) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ALL: [ToneMap; 3] = [ToneMap::Neutral, ToneMap::Agx, ToneMap::Srgb];
+
+    #[test]
+    fn black_stays_black_and_nothing_leaves_the_display() {
+        for map in ALL {
+            assert!(map.apply([0.0; 3]).iter().all(|&c| c < 2e-4), "{map:?} {:?}", map.apply([0.0; 3]));
+            for c in [f32::NAN, f32::NEG_INFINITY, -1.0, f32::INFINITY, f32::MAX, 1e-40] {
+                for rgb in [[c; 3], [c, 0.0, 1.0], [0.5, c, 2.0]] {
+                    assert!(map.apply(rgb).iter().all(|v| (0.0..=1.0).contains(v)), "{map:?} {rgb:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn closed_values() {
+        // Neutral: grey above 0.08 loses 0.04; at 0.04 the parabola loses 0.04 − 0.01.
+        assert!((ToneMap::Neutral.apply([0.18; 3])[0] - 0.14).abs() < 1e-6);
+        assert!((ToneMap::Neutral.apply([0.04; 3])[0] - 0.01).abs() < 1e-6);
+        // Peak 1.24 after the offset: 1 − 0.24²/(1.24 + 0.24 − 0.76) = 0.92, and grey stays grey.
+        assert!(ToneMap::Neutral.apply([1.28; 3]).iter().all(|c| (c - 0.92).abs() < 1e-6));
+        // AgX: mid grey is half the encoded range, the lowest and highest stops its ends.
+        assert!((ToneMap::Agx.apply([0.18; 3])[1] - 0.5f32.powf(2.2)).abs() < 1e-5);
+        assert!((ToneMap::Agx.apply([0.18 * 6.5f32.exp2(); 3])[1] - 1.0).abs() < 1e-5);
+        assert_eq!(ToneMap::Srgb.apply([0.25, 1.0, 3.0]), [0.25, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn greys_stay_grey_and_in_order() {
+        for map in ALL {
+            let mut last = -1.0;
+            for i in -120..80 {
+                let [r, g, b] = map.apply([(i as f32 / 8.0).exp2(); 3]);
+                assert!((r - g).abs() < 1e-5 && (g - b).abs() < 1e-5, "{map:?} {r} {g} {b}");
+                assert!(g >= last, "{map:?} at 2^{i}/8");
+                last = g;
+            }
+        }
+    }
+
+    #[test]
+    fn channels_keep_their_order() {
+        for map in ALL {
+            for scale in [0.01, 0.1, 1.0, 10.0] {
+                let [r, g, b] = map.apply([0.9 * scale, 0.4 * scale, 0.1 * scale]);
+                assert!(r >= g && g >= b, "{map:?} {scale}: {r} {g} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn srgb_is_the_standards() {
+        assert_eq!(srgb_encode(0.0), 0.0);
+        assert!((srgb_encode(1.0) - 1.0).abs() < 1e-6);
+        assert!((srgb_encode(0.214_041_14) - 0.5).abs() < 1e-6);
+        assert!((srgb_encode(0.003_130_9) - srgb_encode(0.003_130_7)).abs() < 1e-5);
+    }
+
+    #[test]
+    fn exposure_ignores_background_and_fireflies() {
+        let grey = vec![[0.36; 3]; 1000];
+        assert!((automatic_exposure(&grey) + 1.0).abs() < 1e-5);
+        let mut noisy = grey.clone();
+        noisy.extend([[0.0; 3]; 5000]);
+        noisy.extend([[1e-6; 3]; 1000]);
+        noisy.extend([[1e6; 3], [f32::INFINITY; 3], [f32::NAN; 3]]);
+        assert!((automatic_exposure(&noisy) + 1.0).abs() < 1e-2, "{}", automatic_exposure(&noisy));
+        assert_eq!(automatic_exposure(&[]), 0.0);
+        assert_eq!(automatic_exposure(&[[0.0; 3]; 4]), 0.0);
+    }
+}

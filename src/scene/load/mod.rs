@@ -1,0 +1,188 @@
+//! Reading scene files.
+//!
+//! A scene file is data from a stranger: every index, offset, count and size is checked before it is used or allocated
+//! for, nothing outside the file's folder is opened, and only regular files are read. That is why glTF and OBJ are read
+//! here rather than by the crates of those names, which panic, hang or follow `../` on some files; serde and the image
+//! decoders do the rest under limits.
+
+mod environment;
+mod files;
+mod geometry;
+mod gltf;
+mod image;
+mod mtl;
+mod obj;
+
+use super::Scene;
+pub use environment::load_environment;
+use files::Source;
+use std::path::{Path, PathBuf};
+
+/// Bytes of one file, at most.
+const MAX_FILE_BYTES: u64 = 4 << 30;
+/// Vertices of a scene, at most, instances counted.
+const MAX_VERTICES: u64 = 256 << 20;
+/// Triangles of a scene, at most, instances counted.
+const MAX_TRIANGLES: u64 = 256 << 20;
+/// Meshes of a scene, at most, instances counted.
+const MAX_MESHES: u64 = 4 << 20;
+/// Texels of a scene's images, at most.
+const MAX_TEXELS: u64 = 1 << 30;
+/// Width and height of an image, at most: sizes are packed into 16 bits for the backends.
+const MAX_IMAGE_SIDE: u32 = 16_384;
+/// Bytes that decoding one image may take.
+const MAX_DECODE_BYTES: u64 = 512 << 20;
+/// Metres from the origin, at most: squares of areas stay finite in f32.
+const MAX_COORDINATE: f32 = 1e9;
+/// Warnings kept; the rest is counted.
+const MAX_WARNINGS: usize = 100;
+
+/// A scene, and what in its file was not honoured.
+#[derive(Debug)]
+pub struct Loaded {
+    /// The scene; [`Scene::check`] holds, but it may have no camera and no light.
+    pub scene: Scene,
+    /// For the user, each naming the place in the file.
+    pub warnings: Vec<String>,
+}
+
+/// Why a file could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum LoadError {
+    /// The file that was asked for cannot be read.
+    #[error("{}: {problem}", file.display())]
+    Unreadable {
+        /// As given by the caller.
+        file: PathBuf,
+        /// In words.
+        problem: String,
+    },
+    /// Not what its name or its first bytes promise.
+    #[error("{}: {problem}", file.display())]
+    Format {
+        /// As given by the caller.
+        file: PathBuf,
+        /// In words.
+        problem: String,
+    },
+    /// A field or line is wrong.
+    #[error("{}: {place}: {problem}", file.display())]
+    Invalid {
+        /// As given by the caller.
+        file: PathBuf,
+        /// Field (`meshes[0].primitives[2].indices`) or line.
+        place: String,
+        /// In words.
+        problem: String,
+    },
+    /// A file named by the scene file cannot be used.
+    #[error("{}: {place}: {}: {problem}", file.display(), path.display())]
+    External {
+        /// As given by the caller.
+        file: PathBuf,
+        /// Field or line that names it.
+        place: String,
+        /// The file named.
+        path: PathBuf,
+        /// In words.
+        problem: String,
+    },
+    /// The file says that it cannot be shown without an extension that is not read here.
+    #[error("{}: extensionsRequired: {extension} is not supported{hint}", file.display())]
+    Extension {
+        /// As given by the caller.
+        file: PathBuf,
+        /// Name of the extension.
+        extension: String,
+        /// What the user can do, or nothing.
+        hint: &'static str,
+    },
+    /// Beyond a limit that keeps memory bounded.
+    #[error("{}: {place}: {problem}", file.display())]
+    TooLarge {
+        /// As given by the caller.
+        file: PathBuf,
+        /// Field or line.
+        place: String,
+        /// In words, with the limit.
+        problem: String,
+    },
+}
+
+/// Reads a `.gltf`, `.glb` or `.obj` file.
+///
+/// Textures and buffers are looked for in the file's folder and below, never outside.
+pub fn load(path: &Path) -> Result<Loaded, LoadError> {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    if !matches!(extension.as_str(), "gltf" | "glb" | "obj") {
+        // Say "no such file" before "unknown extension".
+        files::check_regular(path).map_err(|problem| LoadError::Unreadable { file: path.into(), problem })?;
+        let problem = format!("the extension {extension:?} is none of .gltf, .glb and .obj");
+        return Err(LoadError::Format { file: path.into(), problem });
+    }
+    let (source, bytes) = Source::open(path)?;
+    let mut warnings = Warnings::default();
+    let scene = if extension == "obj" {
+        obj::load(&source, &bytes, &mut warnings)?
+    } else {
+        gltf::load(&source, &bytes, &mut warnings)?
+    };
+    if scene.meshes.iter().all(|mesh| mesh.triangles.is_empty()) {
+        warnings.push(format!("{}: there are no triangles", path.display()));
+    }
+    Ok(Loaded { scene, warnings: warnings.finish() })
+}
+
+/// Collects warnings, each once, a bounded number of them.
+#[derive(Default)]
+struct Warnings {
+    lines: Vec<String>,
+    n_dropped: usize,
+}
+
+impl Warnings {
+    fn push(&mut self, line: String) {
+        if self.lines.contains(&line) {
+            return;
+        }
+        if self.lines.len() < MAX_WARNINGS {
+            self.lines.push(line);
+        } else {
+            self.n_dropped += 1;
+        }
+    }
+
+    fn finish(mut self) -> Vec<String> {
+        if self.n_dropped > 0 {
+            self.lines.push(format!("{} more warnings of this file are not shown", self.n_dropped));
+        }
+        self.lines
+    }
+}
+
+/// What is left of the limits on a scene's size.
+struct Budget {
+    vertices: u64,
+    triangles: u64,
+    meshes: u64,
+}
+
+impl Budget {
+    fn new() -> Self {
+        Self { vertices: MAX_VERTICES, triangles: MAX_TRIANGLES, meshes: MAX_MESHES }
+    }
+
+    /// Takes `copies` meshes of that many vertices and triangles; the error says which limit they exceed.
+    fn take(&mut self, vertices: u64, triangles: u64, copies: u64) -> Result<(), String> {
+        let spend = |left: &mut u64, each: u64, what: &str, limit: u64| {
+            *left = each
+                .checked_mul(copies)
+                .and_then(|all| left.checked_sub(all))
+                .ok_or_else(|| format!("{copies} × {each} {what}: more than {limit} {what} in the scene"))?;
+            Ok(())
+        };
+        spend(&mut self.meshes, 1, "meshes", MAX_MESHES)?;
+        spend(&mut self.vertices, vertices, "vertices", MAX_VERTICES)?;
+        spend(&mut self.triangles, triangles, "triangles", MAX_TRIANGLES)
+    }
+}
