@@ -1,13 +1,17 @@
 //! Scenes by name and by file: `sunfleck scenes`, `sunfleck export`, and what SCENE means.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
+use sunfleck::output::atomic;
 use sunfleck::scene::Scene;
+use sunfleck::scene::export::{self, glb_bytes};
+use sunfleck::scene::shipped::{NAMES, shipped};
 
-use crate::cli::ExportArgs;
-use crate::shim::{self, NAMES, Settings};
+use crate::cli::{ExportArgs, Usage};
+use crate::shim::Settings;
 
 /// What SCENE stands for: a scene file or a shipped name, and the settings that come with it.
 pub fn resolve(scene: &str) -> Result<(PathBuf, Settings)> {
@@ -18,19 +22,16 @@ pub fn resolve(scene: &str) -> Result<(PathBuf, Settings)> {
         return Ok((file, settings));
     }
     if !is_shipped(path) && path.extension().is_none() && !path.exists() {
-        let close = NAMES.iter().map(|(name, _)| *name).find(|name| distance(name, scene) <= 2);
+        let close = NAMES.into_iter().find(|name| distance(name, scene) <= 2);
         let hint = close.map_or(String::new(), |name| format!("did you mean {name}? "));
-        let names: Vec<_> = NAMES.iter().map(|(name, _)| *name).collect();
-        bail!("{scene}: neither a file nor a scene that comes with sunfleck ({hint}there are: {})", names.join(", "));
+        bail!("{scene}: neither a file nor a scene that comes with sunfleck ({hint}there are: {})", NAMES.join(", "));
     }
     Ok((path.to_owned(), Settings::default()))
 }
 
 /// Reads a scene file, or makes a shipped scene; with what was not honoured.
 pub fn load(file: &Path) -> Result<(Scene, Vec<String>)> {
-    if is_shipped(file)
-        && let Some(scene) = shim::shipped(&file.to_string_lossy())
-    {
+    if let Some(scene) = is_shipped(file).then(|| shipped(&file.to_string_lossy())).flatten() {
         return Ok((scene, vec![]));
     }
     let loaded = sunfleck::scene::load::load(file)?;
@@ -39,7 +40,7 @@ pub fn load(file: &Path) -> Result<(Scene, Vec<String>)> {
 
 /// A file of that name comes first.
 fn is_shipped(path: &Path) -> bool {
-    !path.exists() && NAMES.iter().any(|(name, _)| Path::new(name) == path)
+    !path.exists() && NAMES.iter().any(|name| Path::new(name) == path)
 }
 
 /// Letters to add, drop or change (Levenshtein).
@@ -56,20 +57,62 @@ fn distance(a: &str, b: &str) -> usize {
     row[b.chars().count()]
 }
 
+/// `sunfleck scenes`.
 pub fn list() -> Result<ExitCode> {
-    for (name, what) in NAMES {
-        crate::print(&format!("{name:<10} {what}"));
+    for name in NAMES {
+        crate::print(&format!("{name:<10} {}", describe(name)));
     }
     Ok(ExitCode::SUCCESS)
 }
 
+fn describe(name: &str) -> &'static str {
+    match name {
+        "cornell" => "the box with a red and a green wall, a mirror ball and a glass ball",
+        "glass" => "a goblet of red wine and marbles under a small lamp",
+        "pool" => "sun through waves onto a mosaic floor, seen from the terrace",
+        "bathroom" => "lamps inside thick glass: no light arrives except through it",
+        "fireplace" => "a long room lit by hundreds of small flames and two candles",
+        _ => "",
+    }
+}
+
+/// `sunfleck export`.
 pub fn export(args: &ExportArgs) -> Result<ExitCode> {
-    bail!("{}: to come", args.output.display())
+    let path = &args.output;
+    if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb")) {
+        bail!(Usage(format!("-o {}: an exported scene ends in .glb", path.display())));
+    }
+    atomic::check(path)?;
+    let (file, settings) = resolve(&args.scene)?;
+    let (mut scene, warnings) = load(&file)?;
+    settings.apply_to_scene(&mut scene)?;
+    for warning in warnings {
+        eprintln!("sunfleck: warning: {}", crate::one_line(&warning));
+    }
+    let bytes = glb_bytes(&scene)?;
+    atomic::write(path, |writer| writer.write_all(&bytes))?;
+    eprintln!("wrote {}", path.display());
+    if let Some(mut environment) = scene.environment {
+        environment.texels.iter_mut().for_each(|texel| *texel *= environment.strength);
+        let beside = path.with_extension("hdr");
+        export::write_environment_hdr(&environment, &beside)?;
+        let turned = match environment.rotation {
+            0.0 => String::new(),
+            rotation => format!(", turned by {} degrees", rotation.to_degrees()),
+        };
+        eprintln!("wrote {}: glTF has no environment; render with --env {0}{turned}", beside.display());
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::distance;
+    use super::*;
+
+    #[test]
+    fn every_scene_has_a_line() {
+        assert!(NAMES.iter().all(|name| !describe(name).is_empty()));
+    }
 
     #[test]
     fn distances() {

@@ -15,12 +15,6 @@ pub fn parse_count(text: &str) -> Result<u32, String> {
     if value < 0.0 || value > f64::from(u32::MAX) || value.fract() != 0.0 { Err(wrong()) } else { Ok(value as u32) }
 }
 
-pub const NAMES: [(&str, &str); 2] = [("cornell", "a box"), ("glass", "a goblet")];
-
-pub fn shipped(name: &str) -> Option<Scene> {
-    NAMES.iter().any(|n| n.0 == name).then(Scene::default)
-}
-
 #[derive(Default)]
 pub struct Settings {
     pub scene: Option<std::path::PathBuf>,
