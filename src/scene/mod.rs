@@ -4,7 +4,9 @@
 //! emission (nits in glTF), intensity per steradian for point and spot lights (candela), irradiance for directional
 //! ones (lux). Colours are linear RGB with the sRGB primaries.
 
+pub mod export;
 pub mod load;
+pub mod shipped;
 
 use glam::{Affine3A, Mat2, Vec2, Vec3, Vec4};
 

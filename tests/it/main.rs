@@ -1,5 +1,7 @@
 //! Integration tests.
 
+#[cfg(feature = "render")]
+mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
 #[cfg(all(feature = "render", feature = "gpu"))]
