@@ -1,8 +1,7 @@
 //! `pool`: sun through waves onto a mosaic floor, seen from the terrace.
 //!
-//! The water is one closed volume: above, the tessellated waves with index 1.33; on sides and bottom, a millimetre in
-//! front of the mosaic, an index-matched lining of index 1 that bends and reflects nothing. The lining is there because
-//! a segment is absorbed by the material whose back face it ends on: it ends on the lining, not on the mosaic.
+//! The water is the sheet of its waves, which goes on a little way into the walls: below it a path is in water until it
+//! comes out again, so floor and walls need no surface of their own.
 
 use glam::{Affine3A, Quat, Vec2, Vec3};
 
@@ -18,8 +17,8 @@ const HALF: Vec2 = Vec2::new(3.0, 2.0);
 const DEPTH: f32 = 1.35;
 /// Height of the terrace above the calm water, metres.
 const TERRACE: f32 = 0.14;
-/// Between the lining of the water and the mosaic, metres.
-const GAP: f32 = 0.001;
+/// How far the water goes into the walls, metres.
+const OVERLAP: f32 = 0.01;
 /// Cells of the waves along x and z.
 const CELLS: [usize; 2] = [384, 256];
 
@@ -49,19 +48,10 @@ fn waves() -> Vec<Wave> {
         .collect()
 }
 
-/// Lines of the water's grid along z at which the steps end, counted from the far wall, and the height of each tread.
-const TREADS: [(usize, f32); 3] = [(27, -0.30), (54, -0.65), (81, -1.00)];
-
-/// Height of the ground under cell `j` of the water's grid along z, counted from the near wall, metres.
-fn ground(j: usize) -> f32 {
-    let from_far = CELLS[1] - 1 - j;
-    TREADS.iter().find(|(line, _)| from_far < *line).map_or(-DEPTH, |(_, level)| *level)
-}
-
-/// The closed surface of the water: waves and lining.
-pub(super) fn water() -> (Shape, Shape) {
+/// The surface of the water, air in front.
+fn water() -> Shape {
     let waves = waves();
-    let half = HALF - GAP;
+    let half = HALF + OVERLAP;
     let surface = Shape::sheet(CELLS[0], CELLS[1], |u, v| {
         let (x, z) = ((2.0 * u - 1.0) * half.x, (1.0 - 2.0 * v) * half.y);
         let (mut height, mut slope) = (0.0, Vec2::ZERO);
@@ -72,69 +62,15 @@ pub(super) fn water() -> (Shape, Shape) {
         }
         (Vec3::new(x, height, z), Vec3::new(-slope.x, 1.0, -slope.y).normalize())
     });
-    let lining = lining(&surface.positions);
-    (surface.without_uvs(), lining)
-}
-
-/// Sides and bottom of the water, from the edge of the waves to a millimetre in front of the pool and its steps.
-fn lining(waves: &[Vec3]) -> Shape {
-    let (nu, nv) = (CELLS[0], CELLS[1]);
-    let at = |i: usize, j: usize| waves[j * (nu + 1) + i];
-    let down = |p: Vec3, y: f32| Vec3::new(p.x, y + GAP, p.z);
-    let mut lining = Shape::default();
-    for (i, normal) in [(0, -Vec3::X), (nu, Vec3::X)] {
-        for j in 0..nv {
-            let (a, b, y) = (at(i, j), at(i, j + 1), ground(j));
-            let mut face = vec![a, down(a, y), down(b, y)];
-            // Where the next cell's ground is higher, its foot lies on this cell's edge.
-            if j + 1 < nv && ground(j + 1) > y {
-                face.push(down(b, ground(j + 1)));
-            }
-            face.push(b);
-            lining.fan(&face, normal);
-        }
-    }
-    for (j, cell, normal) in [(0, 0, Vec3::Z), (nv, nv - 1, -Vec3::Z)] {
-        for i in 0..nu {
-            let (a, b, y) = (at(i, j), at(i + 1, j), ground(cell));
-            lining.fan(&[a, down(a, y), down(b, y), b], normal);
-        }
-    }
-    // Treads and the risers between them, from near to far.
-    let mut from = 0;
-    while from < nv {
-        let y = ground(from);
-        let to = (from..nv).find(|&j| ground(j) != y).unwrap_or(nv);
-        let mut edge: Vec<Vec3> = (from..=to).map(|j| at(nu, j)).collect();
-        edge.extend((if to == nv { (1..nu).rev().collect() } else { vec![] }).into_iter().map(|i| at(i, to)));
-        edge.extend((from..=to).rev().map(|j| at(0, j)));
-        edge.extend((if from == 0 { (1..nu).collect() } else { vec![] }).into_iter().map(|i| at(i, from)));
-        let centre = 0.5 * (at(0, from) + at(nu, to));
-        for k in 0..edge.len() {
-            lining.fan(&[centre, edge[k], edge[(k + 1) % edge.len()]].map(|p| down(p, y)), -Vec3::Y);
-        }
-        if to < nv {
-            let (a, b, above) = (at(0, to), at(nu, to), ground(to));
-            lining.fan(&[down(a, y), down(b, y), down(b, above), down(a, above)], -Vec3::Z);
-        }
-        from = to;
-    }
-    lining.welded()
+    surface.without_uvs()
 }
 
 pub(super) fn scene() -> Scene {
     let mut b = Builder::default();
-    let absorption = Vec3::new(0.42, 0.075, 0.045);
     let mut matter = Material::glass("water", 1.333);
-    matter.absorption = absorption;
+    matter.absorption = Vec3::new(0.42, 0.075, 0.045);
     let water_material = b.material(matter);
-    let mut matter = Material::glass("water against the pool", 1.0);
-    matter.absorption = absorption;
-    matter.specular = 0.0;
-    let lining_material = b.material(matter);
-    let (surface, lining) = water();
-    b.add("water", surface, water_material);
-    b.add("water against the pool", lining, lining_material);
+    b.add("water", water(), water_material);
 
     basin(&mut b);
     terrace(&mut b);
@@ -168,11 +104,9 @@ fn basin(b: &mut Builder) {
         Shape::quad(Vec3::new(x, low, -z), d, h),
     ];
     b.add("basin", Shape::union(basin), mosaic);
-    let cell = 2.0 * (z - GAP) / CELLS[1] as f32;
-    let steps = TREADS.iter().map(|&(line, level)| {
-        // The lining's grid, less the gap; the solid goes on a millimetre into walls and floor.
-        let front = -z + line as f32 * cell;
-        Shape::cuboid(Vec3::new(-x - 0.001, low - 0.001, -z - 0.001), Vec3::new(x + 0.001, level, front))
+    // Wide steps down from the far wall; they go on a millimetre into walls and floor.
+    let steps = [(0.42, -0.30), (0.84, -0.65), (1.26, -1.00)].map(|(reach, level)| {
+        Shape::cuboid(Vec3::new(-x - 0.001, low - 0.001, -z - 0.001), Vec3::new(x + 0.001, level, reach - z))
     });
     b.add("steps", Shape::union(steps), mosaic);
 }
