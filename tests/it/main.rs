@@ -4,3 +4,5 @@
 mod gpu;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod layout;
+#[cfg(feature = "render")]
+mod loading;
