@@ -6,4 +6,6 @@ mod cli;
 mod gpu;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod layout;
+#[cfg(feature = "render")]
+mod loading;
 mod physics;
