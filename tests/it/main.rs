@@ -4,7 +4,9 @@
 mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
+mod layering;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod layout;
-mod layering;
+#[cfg(feature = "render")]
+mod loading;
 mod physics;

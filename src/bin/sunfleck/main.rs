@@ -8,7 +8,6 @@ mod progress;
 mod render;
 mod report;
 mod scenes;
-mod shim;
 mod stop;
 
 use std::process::ExitCode;

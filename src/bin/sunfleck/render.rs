@@ -41,7 +41,7 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode> {
         if let Err(error) = run.iterate(stages, i, began) {
             break Err(error);
         }
-        let spent = job.budget.spent(i, began.elapsed());
+        let spent = job.budget.spent(i, began.elapsed().as_secs_f64());
         progress.update(&run.status(spent));
         if stop.asked() {
             break Ok(End::Interrupted);

@@ -6,7 +6,7 @@
 //! decoders do the rest under limits.
 
 mod environment;
-mod files;
+pub(super) mod files;
 mod geometry;
 mod gltf;
 mod image;
