@@ -311,9 +311,11 @@ mod camera;
 pub mod check;
 pub mod defaults;
 mod environment;
+pub mod export;
 pub mod load;
 mod packed;
 pub mod settings;
+pub mod shipped;
 
 pub use check::SceneError;
 pub use packed::PackedScene;

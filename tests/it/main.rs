@@ -1,8 +1,11 @@
 //! Integration tests.
 
+#[cfg(feature = "render")]
+mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod layout;
 #[cfg(feature = "render")]
 mod loading;
+mod physics;

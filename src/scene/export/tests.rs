@@ -1,0 +1,1 @@
+//! The file says what the scene says.
