@@ -68,7 +68,7 @@ fn room(b: &mut Builder) {
 fn chimney(b: &mut Builder) {
     let mortar = b.material(Material::diffuse("mortar", srgb(0x8C8378)));
     let brick = b.material(Material::diffuse("brick", srgb(0x9C4F37)));
-    let soot = b.material(Material::diffuse("sooty brick", srgb(0x54392E)));
+    let soot = b.material(Material::diffuse("sooty brick", srgb(0x9A7058)));
     let (w, h, back) = (NICHE.x, NICHE.y + HEARTH, NICHE.z);
     let (half, top) = (BREAST_HALF, MAX.y + 0.001);
     let at = Vec3::new;
@@ -128,7 +128,7 @@ fn chimney(b: &mut Builder) {
 fn candles(b: &mut Builder) {
     let brass = b.material(Material::metal("polished brass", Vec3::new(0.80, 0.60, 0.28), 0.12));
     let wax = b.material(glossy("wax", srgb(0xEFE6CF), 0.35));
-    let flame = b.material(Material::emitter("candle flame", Vec3::new(260.0, 150.0, 52.0)));
+    let flame = b.material(Material::emitter("candle flame", Vec3::new(420.0, 270.0, 120.0)));
     let stick = Profile::start(0.0, 0.0)
         .to(0.042, 0.0)
         .crease()
@@ -185,11 +185,10 @@ fn fire(b: &mut Builder) {
     let bark = b.material(Material::diffuse("bark", srgb(0x4A3426)));
     let base = HEARTH + 0.082;
     let logs = [
-        ([-0.30, 0.048, 0.085], [0.29, 0.050, 0.070], 0.050),
-        ([-0.28, 0.046, -0.075], [0.31, 0.052, -0.065], 0.052),
-        ([-0.22, 0.125, 0.015], [0.24, 0.140, 0.040], 0.046),
-        ([-0.17, 0.20, -0.09], [0.12, 0.065, 0.15], 0.036),
-        ([0.24, 0.205, -0.07], [-0.05, 0.215, 0.06], 0.034),
+        ([-0.30, 0.048, 0.085], [0.29, 0.050, 0.070], 0.046),
+        ([-0.28, 0.046, -0.075], [0.31, 0.050, -0.065], 0.048),
+        ([-0.21, 0.118, -0.02], [0.23, 0.130, 0.020], 0.038),
+        ([-0.16, 0.09, 0.12], [0.10, 0.165, -0.09], 0.028),
     ];
     let mut wood = Shape::default();
     let place = |p: [f32; 3]| Vec3::from(p) + Vec3::new(0.0, base, z);
@@ -199,7 +198,7 @@ fn fire(b: &mut Builder) {
     b.add("logs", wood, bark);
 
     let mut random = Random::new(404);
-    let ember = b.material(Material::emitter("ember", Vec3::new(24.0, 4.6, 0.7)));
+    let ember = b.material(Material::emitter("ember", Vec3::new(110.0, 26.0, 5.0)));
     let mut embers = Shape::default();
     for _ in 0..150 {
         let at = Vec3::new(
@@ -211,20 +210,26 @@ fn fire(b: &mut Builder) {
     }
     b.add("embers", embers, ember);
     let hues = [
-        ("flame core", Vec3::new(150.0, 88.0, 34.0)),
-        ("flame", Vec3::new(95.0, 40.0, 9.0)),
-        ("flame tip", Vec3::new(46.0, 13.0, 1.8)),
+        ("flame core", Vec3::new(520.0, 370.0, 200.0)),
+        ("flame", Vec3::new(380.0, 215.0, 84.0)),
+        ("flame tip", Vec3::new(210.0, 86.0, 22.0)),
     ];
     let mut tongues: [Shape; 3] = Default::default();
-    for _ in 0..330 {
+    for _ in 0..340 {
         let (u, v) = (random.unit() + random.unit() - 1.0, random.unit() + random.unit() - 1.0);
-        let (x, dz) = (0.27 * u, 0.12 * v);
-        let reach = 0.34 * (1.0 - u.abs()).powf(0.8) + 0.05;
-        let t = random.unit() * random.unit().max(0.3);
-        let from = Vec3::new(x * (1.0 - 0.5 * t), base + 0.10 + reach * t, z + dz * (1.0 - 0.6 * t));
-        let hue = if t < 0.18 { 0 } else if t < 0.5 { 1 } else { 2 };
-        let length = random.between(0.045, 0.11) * (1.0 - 0.45 * t);
-        let width = length * random.between(0.13, 0.22);
+        let (x, dz) = (0.28 * u, 0.13 * v);
+        let reach = 0.36 * (1.0 - u.abs()).powf(0.8) + 0.04;
+        let t = random.unit() * random.unit().max(0.55);
+        let from = Vec3::new(x * (1.0 - 0.45 * t), base + 0.09 + 0.07 * (1.0 - u.abs()) + reach * t, z + dz * (1.0 - 0.5 * t));
+        let hue = if t < 0.22 {
+            0
+        } else if t < 0.5 {
+            1
+        } else {
+            2
+        };
+        let length = random.between(0.030, 0.075) * (1.0 - 0.4 * t);
+        let width = length * random.between(0.09, 0.14);
         let sway = Vec3::new(random.between(-0.35, 0.35) - 0.4 * u, 1.0, random.between(-0.3, 0.3)).normalize();
         tongues[hue].append(tongue(from, sway * length, width, random.between(0.0, 6.0)));
     }

@@ -86,7 +86,7 @@ pub(super) fn scene() -> Scene {
     b.add("paper", paper, table);
 
     let glass = b.material(Material::glass("glass", GLASS_IOR));
-    let wine_absorption = Vec3::new(9.0, 115.0, 100.0);
+    let wine_absorption = Vec3::new(3.0, 50.0, 42.0);
     let mut wine = Material::glass("wine against glass", WINE_IOR / GLASS_IOR);
     wine.absorption = wine_absorption;
     let interface = b.material(wine);
@@ -115,11 +115,14 @@ pub(super) fn scene() -> Scene {
         b.add(&format!("marble {k}"), Shape::icosphere(Vec3::new(x, radius + 0.0007, z), radius, 5), material);
     }
 
-    let bulb = b.material(Material::emitter("lamp", Vec3::new(2600.0, 2250.0, 1750.0)));
-    b.add("lamp", Shape::icosphere(Vec3::new(-0.34, 0.46, -0.30), 0.011, 2), bulb);
+    let lamp = b.material(Material::emitter("lamp", Vec3::new(5200.0, 4500.0, 3500.0)));
+    let (at, aim, half) = (Vec3::new(-0.46, 0.46, -0.20), Vec3::new(0.05, 0.06, 0.03), 0.009);
+    let towards = (aim - at).normalize();
+    let (u, v) = towards.any_orthonormal_pair();
+    b.add("lamp", Shape::quad(at - (u + v) * half, u * (2.0 * half), v * (2.0 * half)), lamp);
     let soft = b.material(Material::emitter("soft light", Vec3::new(1.0, 1.15, 1.4)));
     b.add("soft light", Shape::quad(Vec3::new(0.75, 0.15, 0.55), Vec3::new(-0.45, 0.0, 0.60), Vec3::Y * 0.9), soft);
 
-    b.camera("table", Vec3::new(0.10, 0.30, 0.62), Vec3::new(0.005, 0.083, 0.0), 24.0, 16.0 / 9.0);
+    b.camera("table", Vec3::new(0.16, 0.36, 0.70), Vec3::new(0.085, 0.083, 0.01), 25.0, 16.0 / 9.0);
     b.scene
 }
