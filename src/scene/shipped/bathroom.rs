@@ -24,14 +24,14 @@ pub(super) fn scene() -> Scene {
     let glass = b.material(Material::glass("glass", 1.5));
     vanity(&mut b, chrome, ceramic);
     mirror(&mut b, chrome);
-    let filament = b.material(Material::emitter("filament", Vec3::new(14000.0, 11800.0, 9300.0)));
+    let filament = b.material(Material::emitter("filament", Vec3::new(4700.0, 4000.0, 3250.0)));
     for x in [-0.62, 0.62] {
         lamp(&mut b, Vec3::new(x, 1.62, MIN.z + 0.16), glass, filament, chrome);
     }
     shelf(&mut b, glass, chrome);
     towels(&mut b, chrome);
     tub(&mut b, ceramic, chrome);
-    b.camera("door", Vec3::new(-1.12, 1.56, 2.02), Vec3::new(0.16, 1.0, -1.3), 48.0, 16.0 / 9.0);
+    b.camera("door", Vec3::new(-1.10, 1.56, 1.95), Vec3::new(0.14, 1.0, -1.3), 45.0, 16.0 / 9.0);
     b.scene
 }
 

@@ -1,4 +1,4 @@
-//! `fireplace`: a long room lit by hundreds of small flames in a niche, and two candles.
+//! `fireplace`: a long room lit by nothing but hundreds of small flames and embers in a niche.
 
 use glam::{Affine3A, Quat, Vec2, Vec3};
 
@@ -35,7 +35,7 @@ pub(super) fn scene() -> Scene {
 
 /// Walls, ceiling, boards, skirting.
 fn room(b: &mut Builder) {
-    let paint = b.material(Material::diffuse("wall", srgb(0xA9B3A4)));
+    let paint = b.material(Material::diffuse("wall", srgb(0xD3D3C2)));
     let white = b.material(Material::diffuse("ceiling", srgb(0xE9E4DA)));
     let size = MAX - MIN;
     let (x, y, z) = (Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z);
@@ -68,7 +68,7 @@ fn room(b: &mut Builder) {
 fn chimney(b: &mut Builder) {
     let mortar = b.material(Material::diffuse("mortar", srgb(0x8C8378)));
     let brick = b.material(Material::diffuse("brick", srgb(0x9C4F37)));
-    let soot = b.material(Material::diffuse("sooty brick", srgb(0x9A7058)));
+    let soot = b.material(Material::diffuse("sooty brick", srgb(0x443730)));
     let (w, h, back) = (NICHE.x, NICHE.y + HEARTH, NICHE.z);
     let (half, top) = (BREAST_HALF, MAX.y + 0.001);
     let at = Vec3::new;
@@ -124,11 +124,10 @@ fn chimney(b: &mut Builder) {
     candles(b);
 }
 
-/// Two candlesticks with burning candles, a clock, a vase, on the mantel.
+/// Candlesticks and a vase on the mantel.
 fn candles(b: &mut Builder) {
     let brass = b.material(Material::metal("polished brass", Vec3::new(0.80, 0.60, 0.28), 0.12));
     let wax = b.material(glossy("wax", srgb(0xEFE6CF), 0.35));
-    let flame = b.material(Material::emitter("candle flame", Vec3::new(420.0, 270.0, 120.0)));
     let stick = Profile::start(0.0, 0.0)
         .to(0.042, 0.0)
         .crease()
@@ -141,14 +140,10 @@ fn candles(b: &mut Builder) {
         .crease()
         .to(0.0, 0.142);
     let candle = Profile::start(0.0, -0.001).to(0.011, -0.001).crease().to(0.011, 0.13).crease().to(0.0, 0.128);
-    let tongue = Profile::start(0.0, 0.0)
-        .curve([0.006, 0.0], [0.008, 0.010], [0.0052, 0.018], 6)
-        .curve([0.0035, 0.024], [0.0015, 0.030], [0.0, 0.036], 5);
     for (k, x) in [-0.80, -0.62, 0.86].into_iter().enumerate() {
         let at = Vec3::new(x, 1.234, BREAST + 0.10 + 0.03 * (k as f32 - 1.0).abs());
         b.add("candlestick", stick.lathe(48).moved(at), brass);
         b.add("candle", candle.lathe(32).moved(at + Vec3::Y * 0.142), wax);
-        b.add("candle flame", tongue.lathe(12).moved(at + Vec3::Y * 0.275), flame);
     }
     let vase_paint = b.material(glossy("vase", srgb(0x23506E), 0.08));
     let vase = Profile::start(0.0, 0.0)
@@ -198,7 +193,7 @@ fn fire(b: &mut Builder) {
     b.add("logs", wood, bark);
 
     let mut random = Random::new(404);
-    let ember = b.material(Material::emitter("ember", Vec3::new(110.0, 26.0, 5.0)));
+    let ember = b.material(Material::emitter("ember", Vec3::new(660.0, 156.0, 30.0)));
     let mut embers = Shape::default();
     for _ in 0..150 {
         let at = Vec3::new(
@@ -210,9 +205,9 @@ fn fire(b: &mut Builder) {
     }
     b.add("embers", embers, ember);
     let hues = [
-        ("flame core", Vec3::new(520.0, 370.0, 200.0)),
-        ("flame", Vec3::new(380.0, 215.0, 84.0)),
-        ("flame tip", Vec3::new(210.0, 86.0, 22.0)),
+        ("flame core", Vec3::new(3120.0, 2220.0, 1200.0)),
+        ("flame", Vec3::new(2280.0, 1290.0, 504.0)),
+        ("flame tip", Vec3::new(1260.0, 516.0, 132.0)),
     ];
     let mut tongues: [Shape; 3] = Default::default();
     for _ in 0..340 {

@@ -68,7 +68,7 @@ fn water() -> Shape {
 pub(super) fn scene() -> Scene {
     let mut b = Builder::default();
     let mut matter = Material::glass("water", 1.333);
-    matter.absorption = Vec3::new(0.42, 0.075, 0.045);
+    matter.absorption = Vec3::new(0.27, 0.050, 0.030);
     let water_material = b.material(matter);
     b.add("water", water(), water_material);
 
@@ -79,11 +79,11 @@ pub(super) fn scene() -> Scene {
     b.scene.lights.push(PunctualLight {
         position: Vec3::ZERO,
         direction: Vec3::new(-0.45, -1.0, -0.35).normalize(),
-        intensity: Vec3::new(10.0, 9.2, 7.8),
+        intensity: Vec3::new(2.5, 2.3, 1.95),
         kind: PunctualKind::Directional,
     });
     b.scene.environment = Some(sky());
-    b.camera("terrace", Vec3::new(2.75, 2.30, 4.15), Vec3::new(-0.42, -0.55, -0.55), 42.0, 16.0 / 9.0);
+    b.camera("terrace", Vec3::new(2.55, 2.85, 4.05), Vec3::new(-0.30, -0.62, -0.42), 40.0, 16.0 / 9.0);
     b.scene
 }
 
@@ -314,9 +314,9 @@ fn plant(seed: u32) -> Shape {
 /// A clear sky without the sun, the same all around.
 fn sky() -> Environment {
     let (width, height) = (128, 64);
-    let zenith = Vec3::new(0.22, 0.42, 0.85);
-    let horizon = Vec3::new(0.80, 0.90, 1.02);
-    let ground = Vec3::new(0.30, 0.28, 0.25);
+    let zenith = Vec3::new(0.055, 0.105, 0.2125);
+    let horizon = Vec3::new(0.2, 0.225, 0.255);
+    let ground = Vec3::new(0.075, 0.07, 0.0625);
     let texels = (0..height)
         .flat_map(|row| {
             let polar = std::f32::consts::PI * (row as f32 + 0.5) / height as f32;
