@@ -1,6 +1,9 @@
 //! Integration tests.
 
+#[cfg(feature = "render")]
+mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod layout;
+mod physics;

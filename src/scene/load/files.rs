@@ -3,7 +3,7 @@
 use super::{LoadError, MAX_FILE_BYTES};
 use percent_encoding::percent_decode_str;
 use std::fs::{self, File};
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::path::{Component, Path, PathBuf};
 
 /// The scene file, for messages, and the folder that everything it names lies in.
@@ -81,6 +81,12 @@ impl Source {
     pub(super) fn read(&self, place: &str, name: &str) -> Result<Vec<u8>, LoadError> {
         let path = self.resolve(name).map_err(|problem| self.external(place, name, problem))?;
         read_regular(&path, MAX_FILE_BYTES).map_err(|problem| self.external(place, name, problem))
+    }
+
+    /// Whether there is nothing at `name` (rather than something that must not be read).
+    pub(super) fn is_missing(&self, name: &str) -> bool {
+        let path = self.folder.join(name.replace('\\', "/"));
+        !name.contains('\0') && fs::symlink_metadata(path).is_err_and(|e| e.kind() == ErrorKind::NotFound)
     }
 
     fn resolve(&self, name: &str) -> Result<PathBuf, String> {

@@ -137,7 +137,11 @@ pub fn load(path: &Path) -> Result<Loaded, LoadError> {
 #[derive(Default)]
 struct Warnings {
     lines: Vec<String>,
+    /// Of [`Self::push_once`].
+    topics: Vec<String>,
     n_dropped: usize,
+    /// Triangles without area, and where the first was.
+    flat: Option<(usize, String)>,
 }
 
 impl Warnings {
@@ -152,7 +156,23 @@ impl Warnings {
         }
     }
 
+    /// Says `topic` only where it first comes up.
+    fn push_once(&mut self, topic: &str, place: &dyn std::fmt::Display) {
+        if self.topics.len() < MAX_WARNINGS && !self.topics.iter().any(|t| t == topic) {
+            self.topics.push(topic.into());
+            self.push(format!("{place}: {topic}"));
+        }
+    }
+
+    /// Counts triangles that were left out.
+    fn add_flat(&mut self, n: usize, place: &str) {
+        self.flat.get_or_insert_with(|| (0, place.into())).0 += n;
+    }
+
     fn finish(mut self) -> Vec<String> {
+        if let Some((n, place)) = self.flat.take() {
+            self.push(format!("{n} triangles without area are left out, the first in {place}"));
+        }
         if self.n_dropped > 0 {
             self.lines.push(format!("{} more warnings of this file are not shown", self.n_dropped));
         }
