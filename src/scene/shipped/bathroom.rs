@@ -24,14 +24,14 @@ pub(super) fn scene() -> Scene {
     let glass = b.material(Material::glass("glass", 1.5));
     vanity(&mut b, chrome, ceramic);
     mirror(&mut b, chrome);
-    let filament = b.material(Material::emitter("filament", Vec3::new(15000.0, 11200.0, 7200.0)));
+    let filament = b.material(Material::emitter("filament", Vec3::new(4700.0, 4000.0, 3250.0)));
     for x in [-0.62, 0.62] {
         lamp(&mut b, Vec3::new(x, 1.62, MIN.z + 0.16), glass, filament, chrome);
     }
     shelf(&mut b, glass, chrome);
     towels(&mut b, chrome);
     tub(&mut b, ceramic, chrome);
-    b.camera("door", Vec3::new(1.18, 1.50, 2.05), Vec3::new(-0.20, 1.02, -1.3), 46.0, 16.0 / 9.0);
+    b.camera("door", Vec3::new(-1.10, 1.56, 1.95), Vec3::new(0.14, 1.0, -1.3), 45.0, 16.0 / 9.0);
     b.scene
 }
 
