@@ -4,6 +4,7 @@
 mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
+mod layering;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod layout;
 #[cfg(feature = "render")]

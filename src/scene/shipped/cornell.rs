@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
+use super::Builder;
 use super::shape::Shape;
-use super::{Builder, srgb};
 use crate::scene::{Material, Scene};
 
 /// Half the inner width, metres.
@@ -14,8 +14,8 @@ const HEIGHT: f32 = 2.5;
 pub(super) fn scene() -> Scene {
     let mut b = Builder::default();
     let white = b.material(Material::diffuse("white wall", Vec3::new(0.74, 0.73, 0.70)));
-    let red = b.material(Material::diffuse("red wall", srgb(0xA8201A)));
-    let green = b.material(Material::diffuse("green wall", srgb(0x2F7A2F)));
+    let red = b.material(Material::diffuse("red wall", Vec3::new(0.58, 0.07, 0.05)));
+    let green = b.material(Material::diffuse("green wall", Vec3::new(0.13, 0.42, 0.11)));
     let (x, y, z) = (Vec3::X * 2.0 * HALF, Vec3::Y * HEIGHT, Vec3::Z * 2.0 * HALF);
     let corner = Vec3::new(-HALF, 0.0, -HALF);
     let shell = [Shape::quad(corner + z, x, -z), Shape::quad(corner + y, x, z), Shape::quad(corner, x, y)];
@@ -23,7 +23,7 @@ pub(super) fn scene() -> Scene {
     b.add("left wall", Shape::quad(corner + z, -z, y), red);
     b.add("right wall", Shape::quad(corner + x, z, y), green);
 
-    let lamp = b.material(Material::emitter("lamp", Vec3::new(17.0, 13.5, 9.5)));
+    let lamp = b.material(Material::emitter("lamp", Vec3::new(46.0, 38.5, 29.0)));
     let (w, d) = (0.70, 0.52);
     b.add("lamp", Shape::quad(Vec3::new(-w / 2.0, HEIGHT - 0.012, -d / 2.0), Vec3::X * w, Vec3::Z * d), lamp);
     let frame = b.material(Material::metal("lamp frame", Vec3::splat(0.6), 0.35));
@@ -41,9 +41,9 @@ pub(super) fn scene() -> Scene {
     b.add("lamp frame", Shape::union(bars), frame);
 
     let mirror = b.material(Material::metal("mirror", Vec3::new(0.92, 0.91, 0.89), 0.0));
-    b.add("mirror ball", Shape::icosphere(Vec3::new(-0.52, 0.449, -0.48), 0.45, 5), mirror);
+    b.add("mirror ball", Shape::icosphere(Vec3::new(-0.50, 0.519, -0.45), 0.52, 5), mirror);
     let glass = b.material(Material::glass("glass", 1.5));
-    b.add("glass ball", Shape::icosphere(Vec3::new(0.55, 0.421, 0.35), 0.42, 6), glass);
+    b.add("glass ball", Shape::icosphere(Vec3::new(0.56, 0.461, 0.38), 0.46, 6), glass);
 
     b.camera("front", Vec3::new(0.0, 1.25, 4.75), Vec3::new(0.0, 1.22, 0.0), 40.5, 1.0);
     b.scene

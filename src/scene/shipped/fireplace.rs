@@ -1,4 +1,4 @@
-//! `fireplace`: a long room lit by hundreds of small flames in a niche, and two candles.
+//! `fireplace`: a long room lit by nothing but hundreds of small flames and embers in a niche.
 
 use glam::{Affine3A, Quat, Vec2, Vec3};
 
@@ -35,7 +35,7 @@ pub(super) fn scene() -> Scene {
 
 /// Walls, ceiling, boards, skirting.
 fn room(b: &mut Builder) {
-    let paint = b.material(Material::diffuse("wall", srgb(0xA9B3A4)));
+    let paint = b.material(Material::diffuse("wall", srgb(0xD3D3C2)));
     let white = b.material(Material::diffuse("ceiling", srgb(0xE9E4DA)));
     let size = MAX - MIN;
     let (x, y, z) = (Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z);
@@ -68,7 +68,7 @@ fn room(b: &mut Builder) {
 fn chimney(b: &mut Builder) {
     let mortar = b.material(Material::diffuse("mortar", srgb(0x8C8378)));
     let brick = b.material(Material::diffuse("brick", srgb(0x9C4F37)));
-    let soot = b.material(Material::diffuse("sooty brick", srgb(0x54392E)));
+    let soot = b.material(Material::diffuse("sooty brick", srgb(0x443730)));
     let (w, h, back) = (NICHE.x, NICHE.y + HEARTH, NICHE.z);
     let (half, top) = (BREAST_HALF, MAX.y + 0.001);
     let at = Vec3::new;
@@ -99,9 +99,10 @@ fn chimney(b: &mut Builder) {
         seed: 4,
     };
     let lay = |faces: &[(Vec3, Vec3, Vec3)]| {
-        let parts = faces.iter().enumerate().map(|(k, &(corner, u, v))| {
-            Tiling { seed: 40 + k as u32, ..tiling }.over(corner, u, v, |_| true)
-        });
+        let parts = faces
+            .iter()
+            .enumerate()
+            .map(|(k, &(corner, u, v))| Tiling { seed: 40 + k as u32, ..tiling }.over(corner, u, v, |_| true));
         Shape::union(parts)
     };
     b.add("bricks", lay(&faces), brick);
@@ -124,11 +125,10 @@ fn chimney(b: &mut Builder) {
     candles(b);
 }
 
-/// Two candlesticks with burning candles, a clock, a vase, on the mantel.
+/// Candlesticks and a vase on the mantel.
 fn candles(b: &mut Builder) {
     let brass = b.material(Material::metal("polished brass", Vec3::new(0.80, 0.60, 0.28), 0.12));
     let wax = b.material(glossy("wax", srgb(0xEFE6CF), 0.35));
-    let flame = b.material(Material::emitter("candle flame", Vec3::new(260.0, 150.0, 52.0)));
     let stick = Profile::start(0.0, 0.0)
         .to(0.042, 0.0)
         .crease()
@@ -141,14 +141,10 @@ fn candles(b: &mut Builder) {
         .crease()
         .to(0.0, 0.142);
     let candle = Profile::start(0.0, -0.001).to(0.011, -0.001).crease().to(0.011, 0.13).crease().to(0.0, 0.128);
-    let tongue = Profile::start(0.0, 0.0)
-        .curve([0.006, 0.0], [0.008, 0.010], [0.0052, 0.018], 6)
-        .curve([0.0035, 0.024], [0.0015, 0.030], [0.0, 0.036], 5);
     for (k, x) in [-0.80, -0.62, 0.86].into_iter().enumerate() {
         let at = Vec3::new(x, 1.234, BREAST + 0.10 + 0.03 * (k as f32 - 1.0).abs());
         b.add("candlestick", stick.lathe(48).moved(at), brass);
         b.add("candle", candle.lathe(32).moved(at + Vec3::Y * 0.142), wax);
-        b.add("candle flame", tongue.lathe(12).moved(at + Vec3::Y * 0.275), flame);
     }
     let vase_paint = b.material(glossy("vase", srgb(0x23506E), 0.08));
     let vase = Profile::start(0.0, 0.0)
@@ -185,11 +181,10 @@ fn fire(b: &mut Builder) {
     let bark = b.material(Material::diffuse("bark", srgb(0x4A3426)));
     let base = HEARTH + 0.082;
     let logs = [
-        ([-0.30, 0.048, 0.085], [0.29, 0.050, 0.070], 0.050),
-        ([-0.28, 0.046, -0.075], [0.31, 0.052, -0.065], 0.052),
-        ([-0.22, 0.125, 0.015], [0.24, 0.140, 0.040], 0.046),
-        ([-0.17, 0.20, -0.09], [0.12, 0.065, 0.15], 0.036),
-        ([0.24, 0.205, -0.07], [-0.05, 0.215, 0.06], 0.034),
+        ([-0.30, 0.048, 0.085], [0.29, 0.050, 0.070], 0.046),
+        ([-0.28, 0.046, -0.075], [0.31, 0.050, -0.065], 0.048),
+        ([-0.21, 0.118, -0.02], [0.23, 0.130, 0.020], 0.038),
+        ([-0.16, 0.09, 0.12], [0.10, 0.165, -0.09], 0.028),
     ];
     let mut wood = Shape::default();
     let place = |p: [f32; 3]| Vec3::from(p) + Vec3::new(0.0, base, z);
@@ -199,7 +194,7 @@ fn fire(b: &mut Builder) {
     b.add("logs", wood, bark);
 
     let mut random = Random::new(404);
-    let ember = b.material(Material::emitter("ember", Vec3::new(24.0, 4.6, 0.7)));
+    let ember = b.material(Material::emitter("ember", Vec3::new(660.0, 156.0, 30.0)));
     let mut embers = Shape::default();
     for _ in 0..150 {
         let at = Vec3::new(
@@ -211,20 +206,27 @@ fn fire(b: &mut Builder) {
     }
     b.add("embers", embers, ember);
     let hues = [
-        ("flame core", Vec3::new(150.0, 88.0, 34.0)),
-        ("flame", Vec3::new(95.0, 40.0, 9.0)),
-        ("flame tip", Vec3::new(46.0, 13.0, 1.8)),
+        ("flame core", Vec3::new(3120.0, 2220.0, 1200.0)),
+        ("flame", Vec3::new(2280.0, 1290.0, 504.0)),
+        ("flame tip", Vec3::new(1260.0, 516.0, 132.0)),
     ];
     let mut tongues: [Shape; 3] = Default::default();
-    for _ in 0..330 {
+    for _ in 0..340 {
         let (u, v) = (random.unit() + random.unit() - 1.0, random.unit() + random.unit() - 1.0);
-        let (x, dz) = (0.27 * u, 0.12 * v);
-        let reach = 0.34 * (1.0 - u.abs()).powf(0.8) + 0.05;
-        let t = random.unit() * random.unit().max(0.3);
-        let from = Vec3::new(x * (1.0 - 0.5 * t), base + 0.10 + reach * t, z + dz * (1.0 - 0.6 * t));
-        let hue = if t < 0.18 { 0 } else if t < 0.5 { 1 } else { 2 };
-        let length = random.between(0.045, 0.11) * (1.0 - 0.45 * t);
-        let width = length * random.between(0.13, 0.22);
+        let (x, dz) = (0.28 * u, 0.13 * v);
+        let reach = 0.36 * (1.0 - u.abs()).powf(0.8) + 0.04;
+        let t = random.unit() * random.unit().max(0.55);
+        let from =
+            Vec3::new(x * (1.0 - 0.45 * t), base + 0.09 + 0.07 * (1.0 - u.abs()) + reach * t, z + dz * (1.0 - 0.5 * t));
+        let hue = if t < 0.22 {
+            0
+        } else if t < 0.5 {
+            1
+        } else {
+            2
+        };
+        let length = random.between(0.030, 0.075) * (1.0 - 0.4 * t);
+        let width = length * random.between(0.09, 0.14);
         let sway = Vec3::new(random.between(-0.35, 0.35) - 0.4 * u, 1.0, random.between(-0.3, 0.3)).normalize();
         tongues[hue].append(tongue(from, sway * length, width, random.between(0.0, 6.0)));
     }
@@ -241,10 +243,7 @@ fn tongue(from: Vec3, along: Vec3, width: f32, turn: f32) -> Shape {
         from,
     );
     let length = along.length();
-    let profile = Profile::start(0.0, 0.0)
-        .to(width, 0.28 * length)
-        .to(0.6 * width, 0.60 * length)
-        .to(0.0, length);
+    let profile = Profile::start(0.0, 0.0).to(width, 0.28 * length).to(0.6 * width, 0.60 * length).to(0.0, length);
     profile.lathe(5).transformed(pose)
 }
 
@@ -283,7 +282,12 @@ fn fender(b: &mut Builder) {
     // A log basket would hide the fire; irons in a stand do not.
     let mut irons = Shape::default();
     let at = Vec3::new(-1.02, HEARTH - 0.001, BREAST + 0.24);
-    let foot = Profile::start(0.0, 0.0).to(0.085, 0.0).crease().to(0.085, 0.010).crease().curve([0.05, 0.02], [0.012, 0.02], [0.010, 0.05], 10);
+    let foot = Profile::start(0.0, 0.0).to(0.085, 0.0).crease().to(0.085, 0.010).crease().curve(
+        [0.05, 0.02],
+        [0.012, 0.02],
+        [0.010, 0.05],
+        10,
+    );
     irons.append(foot.to(0.010, 0.60).crease().to(0.0, 0.60).lathe(40).moved(at));
     irons.append(Shape::icosphere(at + Vec3::Y * 0.615, 0.022, 3));
     irons.append(Shape::torus(at + Vec3::Y * 0.50, 0.055, 0.005, 48, 12));
@@ -312,7 +316,9 @@ fn seats(b: &mut Builder) {
     for (k, (z, turn, color)) in [(-1.32, 0.35, 0xC8893B), (0.0, -0.25, 0xA23B30)].into_iter().enumerate() {
         let cloth = b.material(Material::diffuse(&format!("cushion {k}"), srgb(color)));
         let pose = Affine3A::from_rotation_translation(
-            Quat::from_rotation_y(std::f32::consts::FRAC_PI_2) * Quat::from_rotation_z(turn * 0.3) * Quat::from_rotation_x(1.20),
+            Quat::from_rotation_y(std::f32::consts::FRAC_PI_2)
+                * Quat::from_rotation_z(turn * 0.3)
+                * Quat::from_rotation_x(1.20),
             Vec3::new(-1.66, 0.66, z),
         );
         let pillow = furniture::cushion(Vec3::new(0.42, 0.09, 0.40), 0.035, 0.045);

@@ -36,18 +36,21 @@ impl Goblet {
             .curve([0.0352, 0.0008], [0.0362, 0.0014], [0.0362, 0.0024], 6)
             .curve([0.0362, 0.0034], [0.0345, 0.0042], [0.0320, 0.0046], 6)
             .curve([0.0180, 0.0068], [0.0060, 0.0085], [0.0046, 0.0200], 14)
-            .curve([0.0036, 0.0290], [0.0034, 0.0400], [0.0034, 0.0550], 10)
-            .curve([0.0034, 0.0700], [0.0042, 0.0850], [0.0085, 0.0900], 10)
-            .curve([0.0250, 0.0955], [0.0435, 0.1180], [0.0435, 0.1450], 26)
-            .curve([0.0435, 0.1700], [0.0365, 0.1930], [0.0345, 0.2120], 20)
-            .curve([0.0344, 0.2132], [0.0328, 0.2132], [0.0327, 0.2120], 8);
+            .curve([0.0038, 0.0235], [0.0034, 0.0240], [0.0034, 0.0290], 8)
+            .curve([0.0034, 0.0420], [0.0042, 0.0540], [0.0085, 0.0580], 10)
+            .curve([0.0300, 0.0620], [0.0560, 0.0830], [0.0560, 0.1120], 28)
+            .curve([0.0560, 0.1380], [0.0460, 0.1630], [0.0420, 0.1800], 20)
+            .curve([0.0418, 0.1812], [0.0402, 0.1812], [0.0401, 0.1800], 8);
         // Down the inner wall: to the wine's level, then wetted.
-        let inside = outside.curve([0.0340, 0.1960], [0.0405, 0.1800], [0.0415, 0.1560], 18);
+        let inside = outside.curve([0.0440, 0.1630], [0.0540, 0.1390], [0.0543, 0.1160], 18);
         let rim_of_wine = inside.last_index();
         let rim = inside.last();
-        let all = inside
-            .curve([0.0418, 0.1480], [0.0417, 0.1390], [0.0404, 0.1320], 8)
-            .curve([0.0368, 0.1120], [0.0190, 0.0975], [0.0, 0.0968], 26);
+        let all = inside.curve([0.0544, 0.1090], [0.0536, 0.1030], [0.0514, 0.0960], 8).curve(
+            [0.0465, 0.0760],
+            [0.0260, 0.0665],
+            [0.0, 0.0655],
+            28,
+        );
         let plain = |_| (1.0, 0.0);
         // The wine climbs the wall by a millimetre and a half. From wall to axis: the air is above.
         let level = |d: f32| rim.y - 0.0015 * (1.0 - (-d / 0.0016).exp());
@@ -86,7 +89,7 @@ pub(super) fn scene() -> Scene {
     b.add("paper", paper, table);
 
     let glass = b.material(Material::glass("glass", GLASS_IOR));
-    let wine_absorption = Vec3::new(9.0, 115.0, 100.0);
+    let wine_absorption = Vec3::new(2.0, 36.0, 31.0);
     let mut wine = Material::glass("wine against glass", WINE_IOR / GLASS_IOR);
     wine.absorption = wine_absorption;
     let interface = b.material(wine);
@@ -100,10 +103,10 @@ pub(super) fn scene() -> Scene {
     b.add("wine against air", goblet.surface.moved(place), surface);
 
     for (k, (x, z, radius, color)) in [
-        (0.098, 0.062, 0.0125, 0x2E6FD0),
-        (0.118, 0.024, 0.0105, 0xF0A818),
-        (-0.112, 0.070, 0.0115, 0x2FA860),
-        (0.045, 0.095, 0.0095, 0xE8E8F0),
+        (0.190, 0.028, 0.0125, 0x2E6FD0),
+        (0.176, -0.030, 0.0105, 0xF0A818),
+        (-0.105, 0.075, 0.0115, 0x2FA860),
+        (-0.008, 0.118, 0.0095, 0xE8E8F0),
     ]
     .into_iter()
     .enumerate()
@@ -115,11 +118,14 @@ pub(super) fn scene() -> Scene {
         b.add(&format!("marble {k}"), Shape::icosphere(Vec3::new(x, radius + 0.0007, z), radius, 5), material);
     }
 
-    let bulb = b.material(Material::emitter("lamp", Vec3::new(2600.0, 2250.0, 1750.0)));
-    b.add("lamp", Shape::icosphere(Vec3::new(-0.34, 0.46, -0.30), 0.011, 2), bulb);
-    let soft = b.material(Material::emitter("soft light", Vec3::new(1.0, 1.15, 1.4)));
+    let lamp = b.material(Material::emitter("lamp", Vec3::new(4600.0, 4050.0, 3300.0)));
+    let (at, aim, half) = (Vec3::new(-0.66, 0.98, -0.36), Vec3::new(0.05, 0.06, 0.03), 0.012);
+    let towards = (aim - at).normalize();
+    let (u, v) = towards.any_orthonormal_pair();
+    b.add("lamp", Shape::quad(at - (u + v) * half, u * (2.0 * half), v * (2.0 * half)), lamp);
+    let soft = b.material(Material::emitter("soft light", Vec3::new(0.55, 0.65, 0.80)));
     b.add("soft light", Shape::quad(Vec3::new(0.75, 0.15, 0.55), Vec3::new(-0.45, 0.0, 0.60), Vec3::Y * 0.9), soft);
 
-    b.camera("table", Vec3::new(0.10, 0.30, 0.62), Vec3::new(0.005, 0.083, 0.0), 24.0, 16.0 / 9.0);
+    b.camera("table", Vec3::new(0.12, 0.37, 0.58), Vec3::new(0.050, 0.066, 0.012), 25.0, 16.0 / 9.0);
     b.scene
 }

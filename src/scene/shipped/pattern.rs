@@ -39,14 +39,14 @@ pub fn noise(p: Vec2, period: [u32; 2], seed: u32) -> f32 {
 
 /// `n × n` glass mosaic stones of a few blues; it repeats.
 pub fn mosaic(n: u32) -> Image {
-    let palette = [0x5FA9C4, 0x6FB8CE, 0x4F98BA, 0x86C8D6, 0x5AA2B8, 0x78BECB].map(encoded);
+    let palette = [0x84BFD2, 0x93CBDA, 0x74B0CA, 0xA6D7E0, 0x7FB8C8, 0x9BD0D8].map(encoded);
     let texels = n * 16;
     image("mosaic", texels, texels, |p| {
         let q = p * n as f32;
         let cell = q.floor();
         let inside = (q - cell - Vec2::splat(0.5)).abs().max_element();
         if inside > 0.44 {
-            return encoded(0xC9D4D2);
+            return encoded(0xDCE4E2);
         }
         let mut random = Random::new(cell.x as u32 * 131 + cell.y as u32 * 7919 + 11);
         let base = palette[(random.unit() * palette.len() as f32) as usize];

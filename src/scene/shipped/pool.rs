@@ -68,7 +68,7 @@ fn water() -> Shape {
 pub(super) fn scene() -> Scene {
     let mut b = Builder::default();
     let mut matter = Material::glass("water", 1.333);
-    matter.absorption = Vec3::new(0.42, 0.075, 0.045);
+    matter.absorption = Vec3::new(0.27, 0.050, 0.030);
     let water_material = b.material(matter);
     b.add("water", water(), water_material);
 
@@ -79,11 +79,11 @@ pub(super) fn scene() -> Scene {
     b.scene.lights.push(PunctualLight {
         position: Vec3::ZERO,
         direction: Vec3::new(-0.45, -1.0, -0.35).normalize(),
-        intensity: Vec3::new(10.0, 9.2, 7.8),
+        intensity: Vec3::new(2.5, 2.3, 1.95),
         kind: PunctualKind::Directional,
     });
     b.scene.environment = Some(sky());
-    b.camera("terrace", Vec3::new(3.1, 2.75, 4.6), Vec3::new(-0.25, -0.62, -0.25), 40.0, 16.0 / 9.0);
+    b.camera("terrace", Vec3::new(2.55, 2.85, 4.05), Vec3::new(-0.30, -0.62, -0.42), 40.0, 16.0 / 9.0);
     b.scene
 }
 
@@ -195,7 +195,8 @@ fn things(b: &mut Builder) {
         let y = -0.22 - 0.29 * k as f32;
         ladder.append(Shape::rod(Vec3::new(x - 0.13, y, -0.62), Vec3::new(x - 0.13, y, -0.14), 0.017, 20));
     }
-    b.add("ladder", ladder, chrome);
+    let across = Affine3A::from_translation(Vec3::Z * 0.30) * Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0));
+    b.add("ladder", ladder.transformed(across), chrome);
 
     let rubber = b.material(glossy("beach ball", Vec3::ONE, 0.25));
     let radius = 0.23;
@@ -220,9 +221,17 @@ fn things(b: &mut Builder) {
     }
     let pose = Affine3A::from_rotation_translation(
         Quat::from_rotation_z(0.7) * Quat::from_rotation_x(0.5),
-        Vec3::new(-0.75, 0.14, 0.72),
+        Vec3::new(0.75, 0.14, 0.30),
     );
     b.add("beach ball", ball.without_uvs().transformed(pose), rubber);
+
+    let wood = b.material(glossy("teak", srgb(0x9A6A3C), 0.45));
+    let cloth = b.material(Material::diffuse("lounger cloth", srgb(0xE4DCCB)));
+    let place =
+        Affine3A::from_rotation_translation(Quat::from_rotation_y(0.22), Vec3::new(1.55, TERRACE - 0.008, -3.25));
+    let (frame, pads) = lounger();
+    b.add("lounger", frame.transformed(place), wood);
+    b.add("lounger pads", pads.transformed(place), cloth);
 
     let clay = b.material(Material::diffuse("clay", srgb(0xB5603C)));
     let pot = Profile::start(0.0, 0.0)
@@ -241,11 +250,40 @@ fn things(b: &mut Builder) {
         .to(0.0, 0.40)
         .lathe(64);
     let leaf = b.material(glossy("leaf", srgb(0x3E7A35), 0.45));
-    for (k, place) in [Vec3::new(-3.9, TERRACE - 0.01, -2.85), Vec3::new(0.6, TERRACE - 0.01, -3.0)].into_iter().enumerate()
+    for (k, place) in
+        [Vec3::new(-3.9, TERRACE - 0.01, -2.85), Vec3::new(-0.4, TERRACE - 0.01, -3.3)].into_iter().enumerate()
     {
         b.add(&format!("pot {k}"), pot.clone().moved(place), clay);
         b.add(&format!("plant {k}"), plant(17 + k as u32).moved(place + Vec3::Y * 0.395), leaf);
     }
+}
+
+/// A wooden lounger along x, its head at −x, and its two pads.
+fn lounger() -> (Shape, Shape) {
+    let block = |min: [f32; 3], max: [f32; 3]| Shape::rounded_cuboid(Vec3::from(min), Vec3::from(max), 0.006, 2);
+    let mut frame = Shape::default();
+    for side in [-0.31, 0.27] {
+        frame.append(block([-0.95, 0.25, side], [0.95, 0.31, side + 0.04]));
+        for x in [-0.80, 0.74] {
+            frame.append(block([x, 0.0, side + 0.002], [x + 0.06, 0.255, side + 0.038]));
+        }
+    }
+    for k in 0..12 {
+        let x = -0.22 + 0.096 * k as f32;
+        frame.append(block([x, 0.292, -0.29], [x + 0.07, 0.312, 0.29]));
+    }
+    let mut back = Shape::default();
+    for k in 0..8 {
+        let x = -0.75 + 0.094 * k as f32;
+        back.append(block([x, -0.012, -0.27], [x + 0.07, 0.010, 0.27]));
+    }
+    let lean = Affine3A::from_rotation_translation(Quat::from_rotation_z(-0.75), Vec3::new(-0.22, 0.305, 0.0));
+    frame.append(back.transformed(lean));
+    let mut pads =
+        super::furniture::cushion(Vec3::new(1.12, 0.07, 0.56), 0.028, 0.012).moved(Vec3::new(0.36, 0.311, 0.0));
+    let pad = super::furniture::cushion(Vec3::new(0.74, 0.07, 0.56), 0.028, 0.012).moved(Vec3::new(-0.39, 0.009, 0.0));
+    pads.append(pad.transformed(lean));
+    (frame, pads)
 }
 
 /// A tuft of long bent leaves.
@@ -279,9 +317,9 @@ fn plant(seed: u32) -> Shape {
 /// A clear sky without the sun, the same all around.
 fn sky() -> Environment {
     let (width, height) = (128, 64);
-    let zenith = Vec3::new(0.22, 0.42, 0.85);
-    let horizon = Vec3::new(0.80, 0.90, 1.02);
-    let ground = Vec3::new(0.30, 0.28, 0.25);
+    let zenith = Vec3::new(0.055, 0.105, 0.2125);
+    let horizon = Vec3::new(0.2, 0.225, 0.255);
+    let ground = Vec3::new(0.075, 0.07, 0.0625);
     let texels = (0..height)
         .flat_map(|row| {
             let polar = std::f32::consts::PI * (row as f32 + 0.5) / height as f32;
