@@ -19,9 +19,9 @@ impl Environment {
         Vec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin())
     }
 
-    /// The same radiance from everywhere.
+    /// The same radiance from everywhere. Several rows, for directions are sampled by row.
     pub fn uniform(radiance: Vec3) -> Self {
-        Self { width: 1, height: 1, texels: vec![radiance], rotation: 0.0, strength: 1.0 }
+        Self { width: 2, height: 32, texels: vec![radiance; 64], rotation: 0.0, strength: 1.0 }
     }
 }
 

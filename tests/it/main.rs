@@ -4,3 +4,4 @@
 mod gpu;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod layout;
+mod physics;
