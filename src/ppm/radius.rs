@@ -53,7 +53,13 @@ pub fn first_radii(frame: &Frame, camera: &Camera, eye: &[EyeVertex], photons: &
     let mut radii: Vec<f32> = eye
         .par_iter()
         .with_min_len(256)
-        .map(|v| if gathers(v) { reach(v, most).unwrap_or(most).max(LEAST_OF_PIXEL * footprint(frame, camera, v)) } else { 0.0 })
+        .map(|v| {
+            if gathers(v) {
+                reach(v, most).unwrap_or(most).max(LEAST_OF_PIXEL * footprint(frame, camera, v))
+            } else {
+                0.0
+            }
+        })
         .collect();
     fill_gaps(&mut radii, frame.width as usize, median);
     radii

@@ -29,7 +29,9 @@ pub fn context() -> Option<Arc<Context>> {
 fn stages() -> Option<MutexGuard<'static, GpuStages>> {
     static STAGES: OnceLock<Mutex<GpuStages>> = OnceLock::new();
     let context = context()?;
-    let stages = STAGES.get_or_init(|| Mutex::new(GpuStages::new(context, &PackedScene::default(), Camera::default()).expect("stages")));
+    let stages = STAGES.get_or_init(|| {
+        Mutex::new(GpuStages::new(context, &PackedScene::default(), Camera::default()).expect("stages"))
+    });
     Some(stages.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
 }
 
@@ -146,7 +148,7 @@ fn brute_force(frame: &Frame, vertex: &EyeVertex, radius: f32, photons: &[Photon
             let delta = (Vec3::from(p.position) - x).as_dvec3();
             let t2 = delta.length_squared() / (r * r);
             let cosine = normal.dot(oct::decode24(p.normal_and_segments).as_dvec3());
-                        let off = delta.dot(normal).abs() / (0.1 * r);
+            let off = delta.dot(normal).abs() / (0.1 * r);
             let side = oct::decode(p.direction).as_dvec3().dot(shading);
             let segments = (vertex.flags >> 8 & 255) + (p.normal_and_segments >> 24);
             if segments > frame.max_segments {

@@ -1,6 +1,8 @@
 //! Integration tests.
 
 #[cfg(all(feature = "render", feature = "gpu"))]
+mod backends;
+#[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod layout;

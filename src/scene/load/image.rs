@@ -74,9 +74,9 @@ impl Entry<'_> {
     fn reader(&self) -> Result<ImageReader<Cursor<&[u8]>>, String> {
         let mut reader = ImageReader::new(Cursor::new(&self.bytes[..]));
         // By content, and by name only for the format that cannot be told by its content.
-        let format = image::guess_format(&self.bytes).ok().or_else(|| {
-            ImageFormat::from_path(&self.file).ok().filter(|&format| format == ImageFormat::Tga)
-        });
+        let format = image::guess_format(&self.bytes)
+            .ok()
+            .or_else(|| ImageFormat::from_path(&self.file).ok().filter(|&format| format == ImageFormat::Tga));
         match format {
             Some(
                 f @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::WebP | ImageFormat::Bmp | ImageFormat::Tga),

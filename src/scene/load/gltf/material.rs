@@ -87,7 +87,8 @@ impl Loader<'_, '_> {
         }
         if let Some(transmission) = &extensions.transmission {
             let here = format!("{place}.extensions.KHR_materials_transmission");
-            material.transmission = self.unit(transmission.transmission_factor, &format!("{here}.transmissionFactor"))?;
+            material.transmission =
+                self.unit(transmission.transmission_factor, &format!("{here}.transmissionFactor"))?;
             if material.transmission > 0.0 {
                 material.transmission_texture =
                     self.texture(&transmission.transmission_texture, &format!("{here}.transmissionTexture"))?;

@@ -105,8 +105,7 @@ impl Walk<'_> {
             }
         }
         if let Some(camera) = node.camera {
-            let camera =
-                lookup(self.source, &self.document.cameras, camera, "cameras", &format!("{place}.camera"))?;
+            let camera = lookup(self.source, &self.document.cameras, camera, "cameras", &format!("{place}.camera"))?;
             self.camera(camera, node, world, place)?;
         }
         if let Some(light) = &node.extensions.light {
@@ -151,12 +150,15 @@ impl Walk<'_> {
         };
         for i in 0..count as usize {
             let vector = |list: &[[f32; 3]], default| list.get(i).map_or(default, |&v| Vec3::from(v).as_dvec3());
-            let rotation = rotations.get(i).map_or(DQuat::IDENTITY, |&[x, y, z, w]| {
-                DQuat::from_xyzw(x.into(), y.into(), z.into(), w.into())
-            });
+            let rotation = rotations
+                .get(i)
+                .map_or(DQuat::IDENTITY, |&[x, y, z, w]| DQuat::from_xyzw(x.into(), y.into(), z.into(), w.into()));
             let translation = vector(&translations, DVec3::ZERO);
             let scale = vector(&scales, DVec3::ONE);
-            if !(rotation.length_squared() > 0.0 && rotation.is_finite() && translation.is_finite() && scale.is_finite())
+            if !(rotation.length_squared() > 0.0
+                && rotation.is_finite()
+                && translation.is_finite()
+                && scale.is_finite())
             {
                 return Err(self.source.invalid(place, format!("the transform of instance {i} is not finite")));
             }
@@ -259,8 +261,11 @@ mod tests {
 
     #[test]
     fn a_camera_stays_rigid_under_scale_and_mirror() {
-        let world =
-            DAffine3::from_scale_rotation_translation(DVec3::new(-2.0, 3.0, 0.5), DQuat::from_rotation_y(1.0), DVec3::X);
+        let world = DAffine3::from_scale_rotation_translation(
+            DVec3::new(-2.0, 3.0, 0.5),
+            DQuat::from_rotation_y(1.0),
+            DVec3::X,
+        );
         let camera = rigid(world).unwrap();
         let m = camera.matrix3;
         assert!((m.transpose() * m).abs_diff_eq(glam::Mat3A::IDENTITY, 1e-6) && m.determinant() > 0.0);

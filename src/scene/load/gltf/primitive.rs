@@ -55,8 +55,7 @@ pub(super) fn load_all(
             let mut placements = placements.iter().peekable();
             while let Some(placement) = placements.next() {
                 // The last instance may have the original.
-                let mut world =
-                    if placements.peek().is_some() { local.clone() } else { std::mem::take(&mut local) };
+                let mut world = if placements.peek().is_some() { local.clone() } else { std::mem::take(&mut local) };
                 geometry::transform(&mut world, &placement.world_from_mesh);
                 let place = format!("{place} at nodes[{}]", placement.node);
                 geometry::clean(&mut world, &place, reader.warnings)
@@ -98,18 +97,11 @@ impl Reader<'_> {
             None => n_vertices,
         };
         let n_triangles = if primitive.mode == TRIANGLES { n_corners / 3 } else { n_corners };
-        budget
-            .take(n_vertices, n_triangles, copies as u64)
-            .map_err(|problem| self.source.too_large(place, problem))
+        budget.take(n_vertices, n_triangles, copies as u64).map_err(|problem| self.source.too_large(place, problem))
     }
 
     /// A primitive in the space of its mesh; `None` if it shows nothing.
-    fn primitive(
-        &mut self,
-        primitive: &Primitive,
-        weights: &[f32],
-        place: &str,
-    ) -> Result<Option<Mesh>, LoadError> {
+    fn primitive(&mut self, primitive: &Primitive, weights: &[f32], place: &str) -> Result<Option<Mesh>, LoadError> {
         match primitive.mode {
             TRIANGLES | TRIANGLE_STRIP | TRIANGLE_FAN => {}
             0..=3 => {
@@ -118,9 +110,8 @@ impl Reader<'_> {
             }
             mode => return Err(self.source.invalid(format!("{place}.mode"), format!("{mode} is unknown"))),
         }
-        let attribute = |name: &str| {
-            primitive.attributes.get(name).map(|&index| (index, format!("{place}.attributes.{name}")))
-        };
+        let attribute =
+            |name: &str| primitive.attributes.get(name).map(|&index| (index, format!("{place}.attributes.{name}")));
         let Some((positions, here)) = attribute("POSITION") else {
             self.warnings.push(format!("{place}: without POSITION nothing is shown"));
             return Ok(None);
@@ -175,13 +166,7 @@ impl Reader<'_> {
     }
 
     /// Adds the morph targets by their weights.
-    fn morph(
-        &mut self,
-        mesh: &mut Mesh,
-        primitive: &Primitive,
-        weights: &[f32],
-        place: &str,
-    ) -> Result<(), LoadError> {
+    fn morph(&mut self, mesh: &mut Mesh, primitive: &Primitive, weights: &[f32], place: &str) -> Result<(), LoadError> {
         /// Targets in use, at most: each costs a pass over the vertices.
         const MAX_TARGETS: usize = 1024;
         let n = mesh.positions.len();
