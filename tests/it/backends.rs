@@ -107,10 +107,10 @@ fn everything() -> Scene {
             material,
         })
         .collect();
-    let light = |kind| PunctualLight {
+    let light = |strength: f32, kind| PunctualLight {
         position: Vec3::new(-1.0, 3.0, 2.0),
         direction: Vec3::new(0.3, -1.0, -0.4).normalize(),
-        intensity: Vec3::new(4.0, 5.0, 6.0),
+        intensity: Vec3::new(4.0, 5.0, 6.0) * strength,
         kind,
     };
     Scene {
@@ -119,16 +119,16 @@ fn everything() -> Scene {
         materials,
         images: vec![noise_image("color", 13, 7), noise_image("normal", 8, 8)],
         lights: vec![
-            light(PunctualKind::Point),
-            light(PunctualKind::Spot { inner: 0.2, outer: 0.5 }),
-            light(PunctualKind::Directional),
+            light(1.0, PunctualKind::Point),
+            light(2.0, PunctualKind::Spot { inner: 0.2, outer: 0.5 }),
+            light(0.05, PunctualKind::Directional),
         ],
         environment: Some(Environment {
             width: 32,
             height: 16,
             texels: (0..512).map(|i| Vec3::from_slice(&random(i, 1)).powf(4.0)).collect(),
             rotation: 0.7,
-            strength: 1.5,
+            strength: 0.02,
         }),
         cameras: vec![Camera {
             aperture_radius: 0.02,
@@ -271,7 +271,7 @@ fn photon_paths_agree(scene: &Scene, params: &Params) {
 
 #[test]
 fn photon_paths_agree_with_everything_lit() {
-    photon_paths_agree(&everything(), &params());
+    photon_paths_agree(&everything(), &Params { n_paths: 150_000, ..params() });
 }
 
 #[test]
@@ -279,6 +279,7 @@ fn photon_paths_agree_when_they_run_to_the_limit() {
     // More photons a path than one round stores, more in all than there is room for at first.
     let mut scene = everything();
     scene.environment = None;
+    scene.lights.truncate(2);
     scene.spheres.push(Sphere { centre: Vec3::ZERO, radius: 9.0, inward: true, material: 0 });
     let params = Params { direct: Direct::Photons, roulette: false, max_photon_segments: 40, ..params() };
     photon_paths_agree(&scene, &Params { n_paths: 3000, ..params });
@@ -315,5 +316,59 @@ fn an_empty_scene_is_black_on_both() {
         iterate(stages, &params().frame(1)).expect("iteration");
         assert_eq!(stages.n_photons(), 0);
         assert!(stages.film().expect("film").pixels.iter().all(|p| *p == [0.0; 4]));
+    }
+}
+
+/// A closed box with a glass ball and a lamp.
+fn cornell() -> Scene {
+    let white = Material::diffuse("white", Vec3::splat(0.73));
+    let red = Material::diffuse("red", Vec3::new(0.65, 0.05, 0.05));
+    let wall = |a: [f32; 3], b: [f32; 3], c: [f32; 3], d: [f32; 3], m| quad("wall", [a, b, c, d].map(Vec3::from), m);
+    Scene {
+        meshes: vec![
+            wall([-1., -1., 1.], [1., -1., 1.], [1., -1., -1.], [-1., -1., -1.], 0),
+            wall([-1., 1., -1.], [1., 1., -1.], [1., 1., 1.], [-1., 1., 1.], 0),
+            wall([-1., -1., -1.], [1., -1., -1.], [1., 1., -1.], [-1., 1., -1.], 0),
+            wall([-1., -1., 1.], [-1., -1., -1.], [-1., 1., -1.], [-1., 1., 1.], 1),
+            wall([1., -1., -1.], [1., -1., 1.], [1., 1., 1.], [1., 1., -1.], 1),
+            wall([-0.25, 0.99, -0.25], [0.25, 0.99, -0.25], [0.25, 0.99, 0.25], [-0.25, 0.99, 0.25], 3),
+        ],
+        spheres: vec![Sphere { centre: Vec3::new(0.3, -0.6, 0.2), radius: 0.4, inward: false, material: 2 }],
+        materials: vec![white, red, Material::glass("glass", 1.5), Material::emitter("lamp", Vec3::splat(15.0))],
+        cameras: vec![Camera::look_at("main", Vec3::new(0.0, 0.0, 3.4), Vec3::ZERO, Vec3::Y, 0.7)],
+        ..Scene::default()
+    }
+}
+
+/// Not a test: `cargo test --test it backends::speed -- --ignored --nocapture`.
+#[test]
+#[ignore = "prints times"]
+fn speed() {
+    for (name, scene) in [("cornell", cornell()), ("everything", everything())] {
+        let size = 512;
+        let packed = Arc::new(PackedScene::new(&scene));
+        let camera = scene.cameras[0].pack(size, size);
+        let Some(context) = context() else { return };
+        let mut gpu = GpuStages::new(context, &packed, camera).expect("stages");
+        let mut cpu = CpuStages::new(packed, camera, [size, size]);
+        let params = Params { n_paths: 262_144, ..Params::new(size, size) };
+        for stages in [&mut cpu as &mut dyn Stages, &mut gpu] {
+            println!("{name} on {}", stages.device());
+            stages.set_first_radii(&vec![0.01; (size * size) as usize]).expect("radii");
+            for i in 1..=4 {
+                let start = std::time::Instant::now();
+                iterate(stages, &params.frame(i)).expect("iteration");
+                let (times, n) = (stages.times().expect("times"), stages.n_photons());
+                println!(
+                    "eye {:.3} photons {:.3} ({n}) build {:.3} gather {:.3} accumulate {:.3}; wall {:.3} s",
+                    times.eye,
+                    times.photons,
+                    times.build,
+                    times.gather,
+                    times.accumulate,
+                    start.elapsed().as_secs_f64()
+                );
+            }
+        }
     }
 }
