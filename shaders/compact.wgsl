@@ -1,4 +1,4 @@
-// Photons from the slots of their paths into one array, in the order of the paths, and the paths that go on likewise.
+// Photons from the slots of their threads into one array, in the order of the threads, and the paths that go on likewise.
 #import common
 #import photon_paths
 
@@ -66,7 +66,7 @@ fn compact_offsets(@builtin(local_invocation_index) local: u32) {
     }
 }
 
-// Reads slots, counters and states, writes photons and states; one thread per path of the chunk.
+// Reads slots, counters and states, writes photons and states; one thread per thread of the chunk.
 // values.x: photons that there is room for.
 @compute @workgroup_size(64)
 fn compact_write(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) local: u32) {

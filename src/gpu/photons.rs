@@ -12,7 +12,9 @@ use crate::ppm::Error;
 /// As in `shaders/lib/photon_paths.wgsl`.
 const CHUNK: u32 = 65536;
 /// As there.
-const SLOTS: u32 = 16;
+const PATHS: u32 = 4;
+/// As there.
+const SLOTS: u32 = 32;
 /// Words before the counts of the threads.
 const N_TOTALS: u32 = 4;
 /// Threads a workgroup.
@@ -26,7 +28,7 @@ pub(super) struct PhotonPaths {
     slots: Array,
     counters: Array,
     states: Array,
-    /// Rounds each chunk gets. A path that needs more shows in the counters; then all is done again with more.
+    /// Rounds each chunk gets. A thread that needs more shows in the counters; then all is done again with more.
     rounds: u32,
 }
 
@@ -60,7 +62,7 @@ impl PhotonPaths {
         if photons.capacity() == 0 {
             photons.reserve(context, 2 * u64::from(frame.n_paths))?;
         }
-        let most_rounds = frame.max_photon_segments.div_ceil(SLOTS).max(1);
+        let most_rounds = (PATHS * frame.max_photon_segments).div_ceil(SLOTS).max(1);
         loop {
             self.rounds = self.rounds.min(most_rounds);
             let room = photons.capacity().min(u64::from(u32::MAX)) as u32;
@@ -94,13 +96,13 @@ impl PhotonPaths {
         let mut batch = Batch::new(context, shared, "photons");
         timer.begin(Stage::Photons, &mut batch);
         batch.encoder().clear_buffer(self.counters.raw(), 0, Some(u64::from(4 * N_TOTALS)));
-        for first in (0..frame.n_paths).step_by(CHUNK as usize) {
+        for first in (0..frame.n_paths).step_by((CHUNK * PATHS) as usize) {
             if first > 0 {
                 batch.submit()?;
                 batch = Batch::new(context, shared, "photons");
             }
-            let n = CHUNK.min(frame.n_paths - first);
-            let groups = n.div_ceil(THREADS);
+            let n = (CHUNK * PATHS).min(frame.n_paths - first);
+            let groups = n.div_ceil(THREADS * PATHS);
             for round in 0..self.rounds {
                 let buffers = [self.slots.all(), self.counters.all(), self.states.all()];
                 batch.dispatch(&self.trace, &buffers, [n, first, round, 0], groups);
