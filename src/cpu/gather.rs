@@ -42,11 +42,14 @@ pub fn gather(
     let mut glossy_sum = Vec3::ZERO;
     tree.visit(centre, radius, |slot, distance2| {
         let photon = &photons[slot as usize];
-        let facing = oct::decode24(photon.normal_and_segments).dot(normal);
-        if (if both_sides { facing.abs() } else { facing }) < MIN_NORMAL_COSINE {
+        if (Vec3::from(photon.position) - centre).dot(normal).abs() > MAX_PLANE_OFFSET * radius {
             return;
         }
-        if (Vec3::from(photon.position) - centre).dot(normal).abs() > MAX_PLANE_OFFSET * radius {
+        let photon_normal = oct::decode24_unscaled(photon.normal_and_segments);
+        let facing = photon_normal.dot(normal);
+        if facing * facing < MIN_NORMAL_COSINE * MIN_NORMAL_COSINE * photon_normal.length_squared()
+            || facing < 0.0 && !both_sides
+        {
             return;
         }
         if segments + (photon.normal_and_segments >> 24) > frame.max_segments {
@@ -54,13 +57,13 @@ pub fn gather(
         }
         let weight = if constant { 1.0 } else { 2.0 * (1.0 - distance2 * inverse_radius2) };
         let power = Vec3::from(photon.power) * weight;
-        let incoming = oct::decode(photon.direction);
+        let incoming = oct::decode_unscaled(photon.direction);
         if incoming.dot(shading_normal) > 0.0 {
             diffuse_sum += power;
         }
         if let Some((bsdf, outgoing)) = &glossy {
             let lobes = Lobes { diffuse: false, specular: true };
-            glossy_sum += power * bsdf.evaluate(*outgoing, incoming, lobes, Transport::Radiance);
+            glossy_sum += power * bsdf.evaluate(*outgoing, incoming.normalize(), lobes, Transport::Radiance);
         }
     });
     let sum = diffuse_sum * Vec3::from(vertex.diffuse) + glossy_sum;

@@ -9,16 +9,16 @@ fn square_from_unit(v: Vec3) -> Vec2 {
 }
 
 #[inline]
-fn unit_from_square(p: Vec2) -> Vec3 {
+fn vector_from_square(p: Vec2) -> Vec3 {
     let z = 1.0 - p.x.abs() - p.y.abs();
     let t = (-z).max(0.0);
-    Vec3::new(p.x - t.copysign(p.x), p.y - t.copysign(p.y), z).normalize()
+    Vec3::new(p.x - t.copysign(p.x), p.y - t.copysign(p.y), z)
 }
 
 #[inline]
 fn quantise(v: f32, steps: f32) -> u32 {
     // Not `round`: halves go to even in WGSL and away from zero here.
-    ((v * 0.5 + 0.5) * steps + 0.5).floor().clamp(0.0, steps) as u32
+    ((v * 0.5 + 0.5) * steps + 0.5).clamp(0.0, steps) as u32
 }
 
 /// 16 bits a component, x in the low half; within 4e-5 radians.
@@ -31,8 +31,13 @@ pub fn encode(v: Vec3) -> u32 {
 /// The unit vector that [`encode`] was given.
 #[inline]
 pub fn decode(bits: u32) -> Vec3 {
-    let p = Vec2::new((bits & 0xffff) as f32, (bits >> 16) as f32) * (2.0 / 65535.0) - 1.0;
-    unit_from_square(p)
+    decode_unscaled(bits).normalize()
+}
+
+/// [`decode`] without the square root: the length is between 1/√3 and 1.
+#[inline]
+pub fn decode_unscaled(bits: u32) -> Vec3 {
+    vector_from_square(Vec2::new((bits & 0xffff) as f32, (bits >> 16) as f32) * (2.0 / 65535.0) - 1.0)
 }
 
 /// 12 bits a component in the low 24 bits; within 7e-4 radians.
@@ -45,8 +50,13 @@ pub fn encode24(v: Vec3) -> u32 {
 /// The unit vector that [`encode24`] was given; the high 8 bits are ignored.
 #[inline]
 pub fn decode24(bits: u32) -> Vec3 {
-    let p = Vec2::new((bits & 0xfff) as f32, (bits >> 12 & 0xfff) as f32) * (2.0 / 4095.0) - 1.0;
-    unit_from_square(p)
+    decode24_unscaled(bits).normalize()
+}
+
+/// [`decode24`] without the square root: the length is between 1/√3 and 1.
+#[inline]
+pub fn decode24_unscaled(bits: u32) -> Vec3 {
+    vector_from_square(Vec2::new((bits & 0xfff) as f32, (bits >> 12 & 0xfff) as f32) * (2.0 / 4095.0) - 1.0)
 }
 
 #[cfg(test)]

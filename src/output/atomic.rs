@@ -13,7 +13,7 @@ use super::Error;
 
 /// Says now whether [`write`] could write `path` later: before hours of work, not after them.
 pub fn check(path: &Path) -> Result<(), Error> {
-    temporary(&target(path)).map(drop).map_err(|source| Error::write(path, source))
+    temporary(&target(path)).map(drop).map_err(|error| Error::write(path, error))
 }
 
 /// Replaces `path` by what `content` writes.
@@ -21,7 +21,7 @@ pub fn write<F>(path: &Path, content: F) -> Result<(), Error>
 where
     F: FnOnce(&mut BufWriter<&mut fs::File>) -> io::Result<()>,
 {
-    replace(&target(path), content).map_err(|source| Error::write(path, source))
+    replace(&target(path), content).map_err(|error| Error::write(path, error))
 }
 
 fn replace(target: &Path, content: impl FnOnce(&mut BufWriter<&mut fs::File>) -> io::Result<()>) -> io::Result<()> {

@@ -35,12 +35,12 @@ impl Picture {
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The file system refused.
-    #[error("cannot write {}: {source}", path.display())]
+    #[error("cannot write {}: {reason}", path.display())]
     Write {
         /// The file asked for.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        reason: String,
     },
     /// The file cannot be read, or is not what its name says.
     #[error("cannot read {}: {reason}", path.display())]
@@ -53,11 +53,20 @@ pub enum Error {
 }
 
 impl Error {
-    fn write(path: &Path, source: std::io::Error) -> Self {
-        Self::Write { path: path.to_owned(), source }
+    fn write(path: &Path, error: std::io::Error) -> Self {
+        Self::Write { path: path.to_owned(), reason: without_number(error) }
     }
 
-    fn read(path: &Path, reason: impl ToString) -> Self {
-        Self::Read { path: path.to_owned(), reason: reason.to_string() }
+    fn read(path: &Path, error: impl ToString) -> Self {
+        Self::Read { path: path.to_owned(), reason: without_number(error) }
+    }
+}
+
+/// "No such file or directory (os error 2)" says the same without its end.
+fn without_number(error: impl ToString) -> String {
+    let text = error.to_string();
+    match text.rfind(" (os error ") {
+        Some(end) if text.ends_with(')') => text[..end].to_owned(),
+        _ => text,
     }
 }

@@ -19,7 +19,7 @@ pub enum ToneMap {
 impl ToneMap {
     /// Exposed radiance to display-linear RGB in [0, 1]. NaN and negative values count as 0.
     pub fn apply(self, rgb: [f32; 3]) -> [f32; 3] {
-        let rgb = rgb.map(|c| c.max(0.0).min(1e9)); // max() turns NaN into 0
+        let rgb = rgb.map(|c| if c > 0.0 { c.min(1e9) } else { 0.0 });
         let mapped = match self {
             Self::Neutral => neutral(rgb),
             Self::Agx => agx(rgb),
@@ -52,7 +52,7 @@ fn agx(rgb: [f32; 3]) -> [f32; 3] {
     /// Moving the chromaticities of all three primaries the share `INSET` towards the white point is, for linear RGB,
     /// c ↦ (1 − INSET)·c + w·c with these weights; their sum is INSET, so white stays.
     const INSET: f32 = 0.2;
-    const WEIGHTS: [f32; 3] = [0.042_398_93, 0.078_430_165, 0.079_170_905];
+    const WEIGHTS: [f32; 3] = [0.042_398_9, 0.078_430_2, 0.079_170_9];
     const LOWEST: f32 = -10.0; // Stops about mid grey.
     const HIGHEST: f32 = 6.5;
     let weigh = |c: [f32; 3]| c[0] * WEIGHTS[0] + c[1] * WEIGHTS[1] + c[2] * WEIGHTS[2];

@@ -132,8 +132,8 @@ impl Params {
     }
 }
 
-/// Chooses the first radii and tells the backend. Call once, before the first [`iterate`].
-pub fn start<S: Stages + ?Sized>(stages: &mut S, params: &Params) -> Result<(), Error> {
+/// Chooses the first radii, tells the backend and returns them, metres, `[h·w]`. Call before the first [`iterate`].
+pub fn start<S: Stages + ?Sized>(stages: &mut S, params: &Params) -> Result<Vec<f32>, Error> {
     let [width, height] = params.film_size();
     let radii = match params.radius {
         FirstRadius::Fixed(r) => vec![r; (width * height) as usize],
@@ -144,7 +144,8 @@ pub fn start<S: Stages + ?Sized>(stages: &mut S, params: &Params) -> Result<(), 
             first_radii(&pilot, &stages.camera(), &stages.eye_vertices()?, &stages.photons()?)
         }
     };
-    stages.set_first_radii(&radii)
+    stages.set_first_radii(&radii)?;
+    Ok(radii)
 }
 
 /// One iteration: the algorithm on one screen.

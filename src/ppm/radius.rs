@@ -50,17 +50,18 @@ pub fn first_radii(frame: &Frame, camera: &Camera, eye: &[EyeVertex], photons: &
         return vec![without_photons(frame, camera, eye); eye.len()];
     };
     let most = median * MOST_OF_MEDIAN;
-    let mut radii: Vec<f32> = eye
-        .par_iter()
-        .with_min_len(256)
-        .map(|v| {
-            if gathers(v) {
-                reach(v, most).unwrap_or(most).max(LEAST_OF_PIXEL * footprint(frame, camera, v))
-            } else {
-                0.0
-            }
-        })
-        .collect();
+    let mut radii = vec![0.0; eye.len()];
+    radii.par_chunks_mut(frame.width as usize).zip(eye.par_chunks(frame.width as usize)).for_each(|(radii, eye)| {
+        // A ball around the pixel to the left, grown by the way from there, holds the same ten photons.
+        let mut last: Option<(Vec3, f32)> = None;
+        for (radius, v) in radii.iter_mut().zip(eye).filter(|(_, v)| gathers(v)) {
+            let position = Vec3::from(v.position);
+            let bound = last.map_or(most, |(p, r)| most.min((r + p.distance(position)) * (1.0 + 1e-5)));
+            let reached = reach(v, bound).unwrap_or(bound);
+            last = Some((position, reached));
+            *radius = reached.max(LEAST_OF_PIXEL * footprint(frame, camera, v));
+        }
+    });
     fill_gaps(&mut radii, frame.width as usize, median);
     radii
 }

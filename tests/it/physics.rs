@@ -275,7 +275,7 @@ fn white_furnace() {
         // Photons matter only where they are gathered inside or behind glass: the ball is convex.
         let n_paths = if material.transmission > 0.0 { 60_000 } else { 1000 };
         let (found, error) = over_seeds(6, |seed| {
-            let params = Params { seed, radius: FirstRadius::Fixed(0.1), n_paths, ..Params::new(72, 72) };
+            let params = Params { seed, radius: FirstRadius::Fixed(0.1), n_paths, ..Params::new(128, 128) };
             mean(&render(&scene, &camera, &params, 8))
         });
         let off = found - 1.0;

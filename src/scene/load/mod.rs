@@ -6,12 +6,13 @@
 //! decoders do the rest under limits.
 
 mod environment;
-mod files;
+pub(super) mod files;
 mod geometry;
 mod gltf;
 mod image;
 mod mtl;
 mod obj;
+mod packing;
 
 use super::Scene;
 pub use environment::load_environment;
@@ -40,7 +41,7 @@ const MAX_WARNINGS: usize = 100;
 /// A scene, and what in its file was not honoured.
 #[derive(Debug)]
 pub struct Loaded {
-    /// The scene; [`Scene::check`] holds, but it may have no camera and no light.
+    /// [`Scene::check`] holds, unless there is nothing to see in it; it may have no camera and no light.
     pub scene: Scene,
     /// For the user, each naming the place in the file.
     pub warnings: Vec<String>,
@@ -137,7 +138,11 @@ pub fn load(path: &Path) -> Result<Loaded, LoadError> {
 #[derive(Default)]
 struct Warnings {
     lines: Vec<String>,
+    /// Of [`Self::push_once`].
+    topics: Vec<String>,
     n_dropped: usize,
+    /// Triangles without area, and where the first was.
+    flat: Option<(usize, String)>,
 }
 
 impl Warnings {
@@ -152,7 +157,23 @@ impl Warnings {
         }
     }
 
+    /// Says `topic` only where it first comes up.
+    fn push_once(&mut self, topic: &str, place: &dyn std::fmt::Display) {
+        if self.topics.len() < MAX_WARNINGS && !self.topics.iter().any(|t| t == topic) {
+            self.topics.push(topic.into());
+            self.push(format!("{place}: {topic}"));
+        }
+    }
+
+    /// Counts triangles that were left out.
+    fn add_flat(&mut self, n: usize, place: &str) {
+        self.flat.get_or_insert_with(|| (0, place.into())).0 += n;
+    }
+
     fn finish(mut self) -> Vec<String> {
+        if let Some((n, place)) = self.flat.take() {
+            self.push(format!("{n} triangles without area are left out, the first in {place}"));
+        }
         if self.n_dropped > 0 {
             self.lines.push(format!("{} more warnings of this file are not shown", self.n_dropped));
         }

@@ -12,7 +12,7 @@ use std::borrow::Cow;
 /// Stands for an infinite index of refraction, which `KHR_materials_ior` writes as 0: reflects 99.6 % head on.
 const INFINITE_IOR: f32 = 1000.0;
 
-/// All materials in file order, and after them glTF's default material, for primitives without one.
+/// All materials in file order.
 pub(super) fn load_all<'a>(
     source: &'a Source,
     document: &'a Document,
@@ -21,13 +21,16 @@ pub(super) fn load_all<'a>(
     warnings: &mut Warnings,
 ) -> Result<Vec<Material>, LoadError> {
     let mut loader = Loader { source, document, buffers, images, warnings };
-    let mut materials = Vec::with_capacity(document.materials.len() + 1);
+    let mut materials = Vec::with_capacity(document.materials.len());
     for (i, material) in document.materials.iter().enumerate() {
         materials.push(loader.material(material, &format!("materials[{i}]"))?);
     }
-    let default = document::Material { name: Some("default".into()), ..document::Material::default() };
-    materials.push(loader.material(&default, "default material")?);
     Ok(materials)
+}
+
+/// glTF's material of primitives without one.
+pub(super) fn default_material() -> Material {
+    Material { name: "default".into(), metallic: 1.0, double_sided: false, ..Material::default() }
 }
 
 struct Loader<'a, 'l> {
@@ -151,7 +154,7 @@ impl Loader<'_, '_> {
                 self.warnings.push(format!("{place}.attenuationDistance: 0 is not a distance; nothing is absorbed"));
                 Ok(Vec3::ZERO)
             }
-            Some(distance) if !(distance > 0.0) => {
+            Some(distance) if distance < 0.0 => {
                 Err(self.source.invalid(format!("{place}.attenuationDistance"), format!("{distance} is not positive")))
             }
             // 1e999 and the like: as good as the default, infinity.

@@ -2,6 +2,7 @@
 
 use super::buffers::{Buffers, lookup};
 use super::document::{self, Document, Primitive};
+use super::material;
 use super::nodes::Placement;
 use crate::scene::load::files::Source;
 use crate::scene::load::geometry;
@@ -24,7 +25,7 @@ pub(super) fn load_all(
     budget: &mut Budget,
     warnings: &mut Warnings,
 ) -> Result<(), LoadError> {
-    let default_material = scene.materials.len().saturating_sub(1);
+    let mut default_material = None;
     // Instances of one mesh are read once, unless a node deforms it in its own way.
     let mut groups: BTreeMap<(usize, Option<usize>), Vec<Placement>> = BTreeMap::new();
     for placement in placements {
@@ -50,7 +51,10 @@ pub(super) fn load_all(
                     lookup(source, &document.materials, material, "materials", &place)?;
                     material
                 }
-                None => default_material,
+                None => *default_material.get_or_insert_with(|| {
+                    scene.materials.push(material::default_material());
+                    scene.materials.len() - 1
+                }),
             };
             let mut placements = placements.iter().peekable();
             while let Some(placement) = placements.next() {

@@ -1,0 +1,370 @@
+//! The command line: what may be typed, and what it means.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::error::ErrorKind;
+use clap::{Args, Parser, Subcommand};
+use sunfleck::output::VERSION;
+use sunfleck::output::tonemap::ToneMap;
+use sunfleck::ppm::{Direct, FirstRadius, Kernel};
+use sunfleck::scene::settings::parse_count;
+
+/// Exit code of a command line that makes no sense.
+pub const USAGE: u8 = 2;
+
+/// An error of the command line that only shows once its parts are put together.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct Usage(pub String);
+
+/// Largest side of a picture, pixels.
+const MAX_SIDE: u32 = 65_535;
+
+const EXAMPLES: &str = "\
+Examples:
+  sunfleck render glass -o glass.png
+  sunfleck render my.glb -o my.exr -o my.png --seconds 300 -r 1920x1080
+  sunfleck compare my.exr reference.exr";
+
+const RENDER_EXAMPLES: &str = "\
+Examples:
+  sunfleck render glass -o glass.png
+      A scene that comes with sunfleck, for a minute at most.
+  sunfleck render my.glb -o my.exr -o my.png --seconds 300 -r 1920x1080 --camera Front
+      Five minutes on a file of yours.
+  sunfleck render pool -o part.exr --crop 0.25,0.75,0.5,1 --iterations 1000
+      The middle half of the picture's width, the lower half of its height.
+  sunfleck render my.toml -o my.png --set photons=2M --env sky.hdr
+      Settings from a file, two of them overridden.
+
+Exit codes: 0 done, 1 error, 2 wrong usage, 130 interrupted and saved (a second Ctrl-C aborts at once).";
+
+/// Renders scenes by progressive photon mapping: caustics through glass and water converge.
+#[derive(Debug, Parser)]
+#[command(name = "sunfleck", version = VERSION, after_help = EXAMPLES, max_term_width = 110)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+
+    /// List the devices that can be rendered with, and exit
+    #[arg(long, global = true, help_heading = "Device")]
+    pub list_devices: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Render a scene
+    Render(Box<RenderArgs>),
+    /// List the scenes that come with sunfleck
+    Scenes,
+    /// Write a scene as .glb, for other programs
+    Export(ExportArgs),
+    /// Measure how far a picture is from a reference, both .exr
+    #[command(after_help = "relMSE is the mean over pixels and channels of (x - y)² / (y² + 0.01); \
+        the trimmed one leaves out the worst 0.1 % of the pixels.")]
+    Compare(CompareArgs),
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = RENDER_EXAMPLES)]
+pub struct RenderArgs {
+    /// .glb, .gltf or .obj file, .toml settings file, or the name of a scene that comes with sunfleck
+    #[arg(value_name = "SCENE")]
+    pub scene: Option<String>,
+
+    /// Where to put the picture: .exr (scene-linear, everything in its header) or .png (tone-mapped); repeatable
+    #[arg(short, long, value_name = "FILE", help_heading = "Output")]
+    pub output: Vec<PathBuf>,
+
+    /// Stops by which a .png is brightened [default: automatic, log-average to mid grey]
+    #[arg(long, value_name = "STOPS", allow_hyphen_values = true, value_parser = exposure, help_heading = "Output")]
+    pub exposure: Option<f32>,
+
+    /// Tone curve of a .png [default: neutral]
+    #[arg(long, value_name = "CURVE", value_parser = tonemap(), help_heading = "Output")]
+    pub tonemap: Option<ToneMap>,
+
+    /// Also write the estimated variance of each pixel's luminance into an .exr, as channel Variance.Y
+    #[arg(long, help_heading = "Output")]
+    pub variance: bool,
+
+    /// Write settings, device and timings of every iteration to a JSON file
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub json: Option<PathBuf>,
+
+    /// Save the pictures every so many seconds on the way
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, value_parser = positive_f64, help_heading = "Output")]
+    pub save_every: Option<f64>,
+
+    /// Stop after so many iterations [default without --seconds: 256, or after a minute]
+    #[arg(long, visible_alias = "spp", value_name = "N", allow_hyphen_values = true, value_parser = parse_count, help_heading = "Budget")]
+    pub iterations: Option<u32>,
+
+    /// Stop after so many seconds of iterations; with --iterations, whichever comes first
+    #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = positive_f64, help_heading = "Budget")]
+    pub seconds: Option<f64>,
+
+    /// Size of the picture [default: 720 high, as wide as the camera says or 1280]
+    #[arg(short, long, value_name = "WxH", value_parser = size, help_heading = "Picture")]
+    pub resolution: Option<[u32; 2]>,
+
+    /// Compute a part only: fractions of width and height between 0 and 1, y down
+    #[arg(long, value_name = "x0,x1,y0,y1", allow_hyphen_values = true, value_parser = crop, help_heading = "Picture")]
+    pub crop: Option<Crop>,
+
+    /// Camera, by name or by number from 0 [default: the first]
+    #[arg(long, value_name = "NAME|N", help_heading = "Picture")]
+    pub camera: Option<String>,
+
+    /// Environment map: .hdr or .exr, latitude-longitude
+    #[arg(long, value_name = "FILE", help_heading = "Picture")]
+    pub env: Option<PathBuf>,
+
+    /// Photon paths an iteration, such as 500k or 2M [default: 500k]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = parse_count, help_heading = "Estimator")]
+    pub photons: Option<u32>,
+
+    /// First radius, metres, or `automatic`: one per pixel from its footprint and a first photon pass
+    #[arg(long, value_name = "METRES", allow_hyphen_values = true, value_parser = radius, help_heading = "Estimator")]
+    pub radius: Option<FirstRadius>,
+
+    /// How fast the radius shrinks, between 0 and 1 [default: 2/3]
+    #[arg(long, allow_hyphen_values = true, value_parser = alpha, help_heading = "Estimator")]
+    pub alpha: Option<f32>,
+
+    /// Density estimation kernel [default: epanechnikov]
+    #[arg(long, value_parser = kernel(), help_heading = "Estimator")]
+    pub kernel: Option<Kernel>,
+
+    /// Who brings light straight from a lamp: sampling at the hit, or photons [default: sampled]
+    #[arg(long, value_name = "BY", value_parser = direct(), help_heading = "Estimator")]
+    pub direct: Option<Direct>,
+
+    /// Longest path from lamp to lens, segments [default: no limit, Russian roulette ends paths]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = parse_count, help_heading = "Estimator")]
+    pub max_segments: Option<u32>,
+
+    /// The setting of the literature: five segments a side, no Russian roulette, photons carry everything, one radius
+    #[arg(long, help_heading = "Estimator")]
+    pub paper: bool,
+
+    /// Of the random numbers: same seed, backend and device, same picture [default: 0]
+    #[arg(long, value_name = "N", help_heading = "Estimator")]
+    pub seed: Option<u32>,
+
+    /// Override a key of the settings file; repeatable
+    #[arg(long, value_name = "KEY=VALUE", help_heading = "Estimator")]
+    pub set: Vec<String>,
+
+    /// Where to compute; auto: a real GPU, else the CPU (software adapters only when named)
+    #[arg(long, value_parser = ["auto", "gpu", "cpu"], default_value = "auto", help_heading = "Device")]
+    pub backend: String,
+
+    /// GPU, by its number or a part of its name; see --list-devices
+    #[arg(long, value_name = "N|NAME", help_heading = "Device")]
+    pub device: Option<String>,
+
+    /// CPU threads [default: all]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Device")]
+    pub threads: Option<u16>,
+
+    /// Say nothing but errors
+    #[arg(short, long, conflicts_with = "verbose", help_heading = "Messages")]
+    pub quiet: bool,
+
+    /// Say more: the scene, the radii, where the time went
+    #[arg(short, long, help_heading = "Messages")]
+    pub verbose: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct ExportArgs {
+    /// Scene file, settings file or the name of a scene that comes with sunfleck
+    #[arg(value_name = "SCENE")]
+    pub scene: String,
+    /// The .glb file
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// The picture
+    #[arg(value_name = "PICTURE.exr")]
+    pub picture: PathBuf,
+    /// What it should be
+    #[arg(value_name = "REFERENCE.exr")]
+    pub reference: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Cli {
+    /// The parsed command line, or the exit code after having said what is wrong with it.
+    pub fn read() -> Result<Self, ExitCode> {
+        Self::try_parse().map_err(|error| match error.kind() {
+            ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
+                let _ = error.print();
+                ExitCode::SUCCESS
+            }
+            kind => {
+                crate::say_error(&usage_line(&error.to_string(), kind));
+                ExitCode::from(USAGE)
+            }
+        })
+    }
+}
+
+/// clap's error in one line: what is wrong, its tips, where to read on; without its usage text.
+fn usage_line(text: &str, kind: ErrorKind) -> String {
+    let wrong = text.split("\nUsage:").next().unwrap_or(text);
+    let wrong = wrong.split("\nFor more information").next().unwrap_or(wrong);
+    let mut line = crate::one_line(wrong.trim_start_matches("error: ")).replace(" tip: ", "; ");
+    if kind == ErrorKind::InvalidSubcommand {
+        line += "; to render a scene: sunfleck render SCENE -o out.png";
+    }
+    line
+}
+
+/// The part of the picture to compute.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crop([f64; 4]);
+
+impl Crop {
+    /// In pixels: x0, y0, x1, y1 (exclusive), each fraction rounded to the nearest edge, so that crops that meet
+    /// neither overlap nor leave a gap. None if nothing is left.
+    pub fn pixels(self, size: [u32; 2]) -> Option<[u32; 4]> {
+        let Self([x0, x1, y0, y1]) = self;
+        let edge = |fraction: f64, n: u32| (fraction * f64::from(n)).round() as u32;
+        let crop = [edge(x0, size[0]), edge(y0, size[1]), edge(x1, size[0]), edge(y1, size[1])];
+        (crop[0] < crop[2] && crop[1] < crop[3]).then_some(crop)
+    }
+}
+
+fn crop(text: &str) -> Result<Crop, String> {
+    let fractions: Vec<f64> = text
+        .split(',')
+        .map(|t| t.trim().parse().map_err(|_| format!("{t:?} is not a number")))
+        .collect::<Result<_, _>>()?;
+    let [x0, x1, y0, y1] = fractions[..] else {
+        return Err("four fractions are needed: x0,x1,y0,y1".into());
+    };
+    if !(0.0 <= x0 && x0 < x1 && x1 <= 1.0 && 0.0 <= y0 && y0 < y1 && y1 <= 1.0) {
+        return Err("0 <= x0 < x1 <= 1 and 0 <= y0 < y1 <= 1 must hold".into());
+    }
+    Ok(Crop([x0, x1, y0, y1]))
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let (width, height) = text.split_once(['x', 'X', '×']).ok_or("a size looks like 1280x720")?;
+    let side = |t: &str| match t.trim().parse() {
+        Ok(n) if (1..=MAX_SIDE).contains(&n) => Ok(n),
+        Ok(_) => Err(format!("a side is 1 to {MAX_SIDE} pixels")),
+        Err(_) if !t.is_empty() && t.bytes().all(|b| b.is_ascii_digit()) => {
+            Err(format!("a side is 1 to {MAX_SIDE} pixels"))
+        }
+        Err(_) => Err(format!("{t:?} is not a number of pixels; a size looks like 1280x720")),
+    };
+    Ok([side(width)?, side(height)?])
+}
+
+fn number<T: std::str::FromStr>(text: &str) -> Result<T, String> {
+    text.trim().parse().map_err(|_| "not a number".to_owned())
+}
+
+fn positive_f64(text: &str) -> Result<f64, String> {
+    match number::<f64>(text)? {
+        // A year: longer would only hide a slip.
+        x if x > 0.0 && x <= 31_557_600.0 => Ok(x),
+        _ => Err("must be above 0 and at most a year".into()),
+    }
+}
+
+fn exposure(text: &str) -> Result<f32, String> {
+    match number::<f32>(text)? {
+        x if x.abs() <= 60.0 => Ok(x),
+        _ => Err("must be between -60 and 60 stops".into()),
+    }
+}
+
+fn alpha(text: &str) -> Result<f32, String> {
+    match number::<f32>(text)? {
+        x if x > 0.0 && x < 1.0 => Ok(x),
+        _ => Err("must be between 0 and 1, neither included".into()),
+    }
+}
+
+fn radius(text: &str) -> Result<FirstRadius, String> {
+    if matches!(text, "automatic" | "auto") {
+        return Ok(FirstRadius::Automatic);
+    }
+    match text.trim().parse::<f32>() {
+        Ok(r) if r > 0.0 && r.is_finite() => Ok(FirstRadius::Fixed(r)),
+        Ok(_) => Err("must be above 0 metres".into()),
+        Err(_) => Err("neither a number of metres nor `automatic`".into()),
+    }
+}
+
+fn tonemap() -> impl TypedValueParser<Value = ToneMap> {
+    PossibleValuesParser::new(["neutral", "agx", "srgb"]).map(|name| match name.as_str() {
+        "agx" => ToneMap::Agx,
+        "srgb" => ToneMap::Srgb,
+        _ => ToneMap::Neutral,
+    })
+}
+
+fn kernel() -> impl TypedValueParser<Value = Kernel> {
+    PossibleValuesParser::new(["epanechnikov", "constant"])
+        .map(|name| if name == "constant" { Kernel::Constant } else { Kernel::Epanechnikov })
+}
+
+fn direct() -> impl TypedValueParser<Value = Direct> {
+    PossibleValuesParser::new(["sampled", "photons"])
+        .map(|name| if name == "photons" { Direct::Photons } else { Direct::Sampled })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_declaration_is_sound() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes_and_crops() {
+        assert_eq!(size("1280x720"), Ok([1280, 720]));
+        for wrong in
+            ["0x0", "1280", "1280x", "x720", "-1x5", "1e6x1e6", "1000000x1", "99999999999999999999x1", "axb", ""]
+        {
+            assert!(size(wrong).is_err(), "{wrong}");
+        }
+        let of = |text: &str, size| crop(text).unwrap().pixels(size);
+        assert_eq!(of("0,1,0,1", [7, 5]), Some([0, 0, 7, 5]));
+        assert_eq!(of("0.25,0.75,0.5,1", [640, 480]), Some([160, 240, 480, 480]));
+        assert_eq!(of("0,0.01,0,1", [10, 10]), None);
+        for wrong in ["", "1", "0,1,0", "0,1,0,2", "0.5,0.5,0,1", "0.6,0.5,0,1", "nan,1,0,1", "-0.1,1,0,1", "0,1,0,1,0"]
+        {
+            assert!(crop(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn numbers() {
+        for wrong in ["0", "1", "nan", "-0.5", "inf", "x", ""] {
+            assert!(alpha(wrong).is_err(), "{wrong}");
+        }
+        for wrong in ["0", "-1", "nan", "inf", "big", ""] {
+            assert!(radius(wrong).is_err(), "{wrong}");
+            assert!(positive_f64(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(radius("0.1"), Ok(FirstRadius::Fixed(0.1)));
+        assert_eq!(radius("auto"), Ok(FirstRadius::Automatic));
+    }
+}

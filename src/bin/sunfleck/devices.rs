@@ -1,0 +1,104 @@
+//! Where to compute: which backend, which device.
+
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use anyhow::{Result, anyhow, bail};
+use sunfleck::cpu::CpuStages;
+#[cfg(feature = "gpu")]
+use sunfleck::gpu::{self, Choice, Context, GpuStages};
+use sunfleck::ppm::Stages;
+use sunfleck::scene::PackedScene;
+
+use crate::cli::{RenderArgs, Usage};
+use crate::job::Input;
+use crate::progress::Progress;
+
+/// What will compute.
+pub enum Device {
+    Cpu,
+    #[cfg(feature = "gpu")]
+    Gpu(Arc<Context>),
+}
+
+/// Limits the CPU's threads.
+pub fn use_threads(threads: Option<u16>) -> Result<()> {
+    let builder = rayon::ThreadPoolBuilder::new().num_threads(threads.map_or(0, usize::from));
+    builder.build_global().map_err(|e| anyhow!("--threads: {e}"))
+}
+
+/// Opens what was asked for.
+pub fn open(args: &RenderArgs, progress: &Progress) -> Result<Device> {
+    if args.backend != "cpu" {
+        return open_gpu(args, progress);
+    }
+    match &args.device {
+        Some(device) => bail!(Usage(format!("--device {device} names a GPU, --backend cpu does without"))),
+        None => Ok(Device::Cpu),
+    }
+}
+
+#[cfg(not(feature = "gpu"))]
+fn open_gpu(args: &RenderArgs, _: &Progress) -> Result<Device> {
+    match args.backend == "gpu" || args.device.is_some() {
+        true => bail!("this sunfleck was built without the GPU backend"),
+        false => Ok(Device::Cpu),
+    }
+}
+
+#[cfg(feature = "gpu")]
+fn open_gpu(args: &RenderArgs, progress: &Progress) -> Result<Device> {
+    let devices = gpu::list_devices();
+    let choice = match &args.device {
+        Some(wanted) => {
+            let index = wanted.parse().ok().filter(|&i: &usize| devices.iter().any(|d| d.index == i));
+            index.map_or_else(|| Choice::Name(wanted.clone()), Choice::Index)
+        }
+        None if args.backend == "gpu" => Choice::Any,
+        None if devices.iter().any(gpu::DeviceInfo::is_real) => Choice::Real,
+        None => return Ok(Device::Cpu),
+    };
+    match Context::new(&choice) {
+        Ok(context) => Ok(Device::Gpu(Arc::new(context))),
+        // Nobody asked for a GPU, and there is something else.
+        Err(error) if choice == Choice::Real => {
+            progress.say(&format!("sunfleck: warning: {error}; using the CPU"));
+            Ok(Device::Cpu)
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+impl Device {
+    /// `cpu` or `gpu`.
+    pub fn backend(&self) -> &'static str {
+        match self {
+            Self::Cpu => "cpu",
+            #[cfg(feature = "gpu")]
+            Self::Gpu(_) => "gpu",
+        }
+    }
+
+    /// Takes the scene to the device.
+    pub fn stages(&self, input: &Input) -> Result<Box<dyn Stages>> {
+        let params = &input.params;
+        let scene = Arc::new(PackedScene::new(&input.scene));
+        let camera = input.camera.pack(params.size[0], params.size[1]);
+        Ok(match self {
+            Self::Cpu => Box::new(CpuStages::new(scene, camera, params.film_size())),
+            #[cfg(feature = "gpu")]
+            Self::Gpu(context) => Box::new(GpuStages::new(Arc::clone(context), camera)?),
+        })
+    }
+}
+
+/// `--list-devices`.
+pub fn list() -> Result<ExitCode> {
+    #[cfg(feature = "gpu")]
+    for device in gpu::list_devices() {
+        crate::print(&format!("{:<4} {device}", device.index));
+    }
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    crate::print(&format!("cpu  {threads} threads (--backend cpu)"));
+    Ok(ExitCode::SUCCESS)
+}

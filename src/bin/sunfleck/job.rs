@@ -1,0 +1,256 @@
+//! What is to be rendered: the command line over the settings file over the defaults, checked before anything slow.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail, ensure};
+use sunfleck::layout::EyeVertex;
+use sunfleck::output::atomic;
+use sunfleck::output::png::Look;
+use sunfleck::ppm::{Direct, FirstRadius, Kernel, Params};
+use sunfleck::scene::defaults::{add_default_light, default_camera};
+use sunfleck::scene::load::{Loaded, load_environment};
+use sunfleck::scene::{Camera, Scene, settings};
+
+use crate::cli::{RenderArgs, Usage};
+use crate::scenes::Source;
+
+/// Where nothing is said: as many iterations as look good on the shipped scenes, but no longer than one waits for.
+const DEFAULT_ITERATIONS: u32 = 256;
+const DEFAULT_SECONDS: f64 = 60.0;
+/// Height of the picture, and its width where neither user nor camera say.
+const DEFAULT_SIZE: [u32; 2] = [1280, 720];
+/// Segments of an eye path and of a photon path in the setting of the literature.
+const PAPER_SEGMENTS: u32 = 5;
+
+/// When to stop: whichever comes first.
+#[derive(Clone, Copy, Debug)]
+pub struct Budget {
+    pub iterations: Option<u32>,
+    pub seconds: Option<f64>,
+}
+
+impl Budget {
+    /// How much of it is used up, from 0 to 1.
+    pub fn spent(&self, iterations: u32, seconds: f64) -> f64 {
+        let by_iterations = self.iterations.map_or(0.0, |n| f64::from(iterations) / f64::from(n));
+        let by_time = self.seconds.map_or(0.0, |limit| seconds / limit);
+        by_iterations.max(by_time).min(1.0)
+    }
+}
+
+/// What the command line asks for.
+pub struct Job {
+    /// As given.
+    pub scene_name: String,
+    /// Files to write, `.exr` or `.png`.
+    pub outputs: Vec<PathBuf>,
+    /// How a `.png` looks.
+    pub look: Look,
+    /// When to stop.
+    pub budget: Budget,
+    /// One radius for all pixels, the median of the automatic ones.
+    pub one_radius: bool,
+    source: Source,
+}
+
+/// What the stages read.
+pub struct Input {
+    pub scene: Scene,
+    pub camera: Camera,
+    pub params: Params,
+    pub warnings: Vec<String>,
+}
+
+impl Job {
+    /// Reads the settings and makes sure that every output can be written.
+    pub fn resolve(args: &RenderArgs) -> Result<Self> {
+        let scene_name =
+            args.scene.clone().ok_or_else(|| Usage("which scene? sunfleck render SCENE -o out.png".into()))?;
+        check_outputs(args)?;
+        let mut source = Source::resolve(&scene_name)?;
+        let settings = &mut source.settings;
+        for pair in &args.set {
+            settings.set(pair).map_err(|e| Usage(format!("--set {pair}: {e}")))?;
+        }
+        // What the command line names replaces what the file says, and is not looked for.
+        settings.environment = settings.environment.take().filter(|_| args.env.is_none());
+        settings.camera = settings.camera.take().filter(|_| args.camera.is_none());
+        let iterations = args.iterations.or(settings.iterations.map(|n| n.0));
+        let budget = match (iterations, args.seconds.or(settings.seconds)) {
+            (None, None) => Budget { iterations: Some(DEFAULT_ITERATIONS), seconds: Some(DEFAULT_SECONDS) },
+            (iterations, seconds) => Budget { iterations, seconds },
+        };
+        let radius = args.radius.or(settings.radius.map(first_radius)).unwrap_or_default();
+        Ok(Self {
+            scene_name,
+            outputs: args.output.clone(),
+            look: Look { exposure: args.exposure.or(settings.exposure), tonemap: args.tonemap.unwrap_or_default() },
+            budget,
+            one_radius: args.paper && radius == FirstRadius::Automatic,
+            source,
+        })
+    }
+
+    /// Reads the scene and chooses the camera and the estimator's parameters.
+    pub fn load(&self, args: &RenderArgs) -> Result<Input> {
+        let mut loaded = self.source.scene()?;
+        if let Some(path) = &args.env {
+            let (environment, warnings) = load_environment(path)?;
+            loaded.scene.environment = Some(environment);
+            loaded.warnings.extend(warnings);
+        }
+        self.source.apply(&mut loaded)?;
+        let Loaded { mut scene, mut warnings } = loaded;
+        warnings.extend(add_default_light(&mut scene));
+        if scene.cameras.is_empty() {
+            scene.cameras.push(default_camera(&scene));
+        }
+        scene.check().with_context(|| self.scene_name.clone())?;
+        let camera = camera(&scene, args.camera.as_deref())?;
+        let params = self.params(args, &camera)?;
+        Ok(Input { scene, camera, params, warnings })
+    }
+
+    /// The command line over the settings over the defaults.
+    fn params(&self, args: &RenderArgs, camera: &Camera) -> Result<Params> {
+        let settings = &self.source.settings;
+        let size = args.resolution.or(settings.size.map(|size| size.0));
+        let [width, height] = size.unwrap_or_else(|| default_size(camera));
+        let mut params = Params::new(width, height);
+        if args.paper {
+            params.direct = Direct::Photons;
+            params.roulette = false;
+            params.max_eye_segments = PAPER_SEGMENTS;
+            params.max_photon_segments = PAPER_SEGMENTS;
+        }
+        if let Some(crop) = args.crop {
+            let nothing = || Usage(format!("--crop: no pixel of {width}x{height} is left"));
+            params.crop = crop.pixels(params.size).ok_or_else(nothing)?;
+        }
+        params.seed = args.seed.or(settings.seed).unwrap_or(params.seed);
+        params.n_paths = args.photons.or(settings.photons.map(|n| n.0)).unwrap_or(params.n_paths);
+        params.alpha = args.alpha.or(settings.alpha).unwrap_or(params.alpha);
+        params.radius = args.radius.or(settings.radius.map(first_radius)).unwrap_or(params.radius);
+        params.kernel = args.kernel.or(settings.kernel.map(kernel)).unwrap_or(params.kernel);
+        params.direct = args.direct.or(settings.direct.map(direct)).unwrap_or(params.direct);
+        if let Some(n) = args.max_segments.or(settings.max_segments) {
+            params.max_segments = n;
+            params.max_eye_segments = params.max_eye_segments.min(n);
+            params.max_photon_segments = params.max_photon_segments.min(n);
+        }
+        check_memory(&params)?;
+        Ok(params)
+    }
+}
+
+fn first_radius(radius: settings::FirstRadius) -> FirstRadius {
+    match radius {
+        settings::FirstRadius::Automatic => FirstRadius::Automatic,
+        settings::FirstRadius::Fixed(radius) => FirstRadius::Fixed(radius),
+    }
+}
+
+fn kernel(kernel: settings::Kernel) -> Kernel {
+    match kernel {
+        settings::Kernel::Epanechnikov => Kernel::Epanechnikov,
+        settings::Kernel::Constant => Kernel::Constant,
+    }
+}
+
+fn direct(direct: settings::Direct) -> Direct {
+    match direct {
+        settings::Direct::Sampled => Direct::Sampled,
+        settings::Direct::Photons => Direct::Photons,
+    }
+}
+
+fn default_size(camera: &Camera) -> [u32; 2] {
+    let [width, height] = DEFAULT_SIZE;
+    match camera.aspect {
+        Some(aspect) => [(aspect * height as f32).round().clamp(1.0, 16_384.0) as u32, height],
+        None => [width, height],
+    }
+}
+
+/// The camera of that name or number; the first if none is named.
+fn camera(scene: &Scene, wanted: Option<&str>) -> Result<Camera> {
+    let Some(wanted) = wanted else { return Ok(scene.cameras[0].clone()) };
+    let by_name = scene.cameras.iter().find(|c| c.name == wanted);
+    let by_number = || wanted.parse().ok().and_then(|i: usize| scene.cameras.get(i));
+    by_name.or_else(by_number).cloned().with_context(|| {
+        let list: Vec<_> = scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} {:?}", c.name)).collect();
+        format!("no camera {wanted:?}; there is {}", list.join(", "))
+    })
+}
+
+/// Refuses what could not be written later, or would overwrite what is read.
+fn check_outputs(args: &RenderArgs) -> Result<()> {
+    if args.output.is_empty() && args.json.is_none() {
+        bail!(Usage("nowhere to put the picture: add -o out.png or -o out.exr".into()));
+    }
+    for path in &args.output {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        if !matches!(extension.as_deref(), Some("exr" | "png")) {
+            bail!(Usage(format!("-o {}: a picture ends in .exr or .png", path.display())));
+        }
+    }
+    let files: Vec<_> = args.output.iter().chain(&args.json).collect();
+    for (i, path) in files.iter().enumerate() {
+        if files[..i].iter().any(|other| same_file(other, path)) {
+            bail!(Usage(format!("{} is to be written twice", path.display())));
+        }
+        let scene = args.scene.as_ref().map(PathBuf::from);
+        if scene.iter().chain(&args.env).any(|input| input.is_file() && same_file(input, path)) {
+            bail!(Usage(format!("{} is read and to be written", path.display())));
+        }
+    }
+    for path in files {
+        atomic::check(path)?;
+    }
+    Ok(())
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    let place = |path: &Path| {
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        path.canonicalize().ok().or_else(|| Some(folder.canonicalize().ok()?.join(path.file_name()?)))
+    };
+    a == b || place(a).is_some_and(|a| place(b).is_some_and(|b| a == b))
+}
+
+/// Refuses a picture or a number of photons that this machine has no room for.
+fn check_memory(params: &Params) -> Result<()> {
+    let [width, height] = params.film_size();
+    // A pixel: what the eye sees, radiance, film, radius, and two copies on the way to a file.
+    let pixel = size_of::<EyeVertex>() + 12 + 16 + 4 + 2 * 16;
+    // A path: some four photons of 48 bytes, sorted into a second array, with keys and tree.
+    let path = 4 * (2 * 48 + 16);
+    let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
+    let needs = [
+        (u64::from(width) * u64::from(height) * pixel as u64, format!("a picture of {width}x{height} pixels")),
+        (u64::from(params.n_paths) * path, format!("{} photon paths an iteration", params.n_paths)),
+    ];
+    let available = available_memory();
+    for (bytes, what) in needs {
+        ensure!(
+            bytes <= available,
+            "{what} would need some {:.1} GiB of memory; {:.1} GiB are free",
+            gib(bytes),
+            gib(available)
+        );
+    }
+    Ok(())
+}
+
+/// Bytes, as far as the system tells; else a bound on what anybody has.
+fn available_memory() -> u64 {
+    const UNKNOWN: u64 = 64 << 30;
+    let number = |text: &str| text.split_whitespace().find_map(|word| word.parse::<u64>().ok());
+    let read = |path: &str| std::fs::read_to_string(path).ok();
+    let free = read("/proc/meminfo")
+        .and_then(|text| number(text.lines().find(|line| line.starts_with("MemAvailable:"))?))
+        .map_or(UNKNOWN, |kib| kib.saturating_mul(1024));
+    let group = |file: &str| read(&format!("/sys/fs/cgroup/{file}")).and_then(|text| number(&text));
+    let allowed = group("memory.max").map_or(u64::MAX, |max| max.saturating_sub(group("memory.current").unwrap_or(0)));
+    free.min(allowed)
+}

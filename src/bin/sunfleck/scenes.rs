@@ -1,0 +1,156 @@
+//! Scenes by name and by file: `sunfleck scenes`, `sunfleck export`, and what SCENE means.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::{Context, Result, bail};
+use sunfleck::output::atomic;
+use sunfleck::scene::export::{self, glb_bytes};
+use sunfleck::scene::load::{Loaded, load};
+use sunfleck::scene::settings::Settings;
+use sunfleck::scene::shipped::{NAMES, shipped};
+
+use crate::cli::{ExportArgs, Usage};
+
+/// What SCENE stands for.
+pub struct Source {
+    /// A scene file, or the name of a shipped scene.
+    pub file: PathBuf,
+    /// What the settings file says; nothing without one.
+    pub settings: Settings,
+    /// Where the settings file lies.
+    pub folder: PathBuf,
+}
+
+impl Source {
+    /// Reads the settings, if SCENE is a settings file; not yet the scene.
+    pub fn resolve(scene: &str) -> Result<Self> {
+        let path = Path::new(scene);
+        if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+            check_name(scene)?;
+            return Ok(Self { file: path.to_owned(), settings: Settings::default(), folder: PathBuf::new() });
+        }
+        let settings = Settings::load(path)?;
+        let named = settings.scene.as_ref().with_context(|| format!("{scene}: scene: is missing: it names a file"))?;
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        let beside = folder.join(named);
+        let file = if !beside.exists() && NAMES.contains(&named.as_str()) { named.into() } else { beside };
+        Ok(Self { file, settings, folder })
+    }
+
+    /// Reads the scene as its file has it, or makes a shipped one; with what was not honoured.
+    pub fn scene(&self) -> Result<Loaded> {
+        if let Some(scene) = is_shipped(&self.file).then(|| shipped(&self.file.to_string_lossy())).flatten() {
+            return Ok(Loaded { scene, warnings: vec![] });
+        }
+        Ok(load(&self.file)?)
+    }
+
+    /// Changes a scene as the settings say.
+    pub fn apply(&self, loaded: &mut Loaded) -> Result<()> {
+        let warnings = self
+            .settings
+            .apply_to_scene(&mut loaded.scene, &self.folder)
+            .with_context(|| format!("settings for {}", self.file.display()))?;
+        loaded.warnings.extend(warnings);
+        Ok(())
+    }
+}
+
+/// Whether `scene` can be anything; if not, says what is near.
+fn check_name(scene: &str) -> Result<()> {
+    let path = Path::new(scene);
+    if path.extension().is_some() || path.exists() || NAMES.contains(&scene) {
+        return Ok(());
+    }
+    let close = NAMES.into_iter().find(|name| distance(name, scene) <= 2);
+    let hint = close.map_or(String::new(), |name| format!("did you mean {name}? "));
+    bail!("{scene}: neither a file nor a scene that comes with sunfleck ({hint}there are: {})", NAMES.join(", "));
+}
+
+/// A file of that name comes first.
+fn is_shipped(path: &Path) -> bool {
+    !path.exists() && NAMES.iter().any(|name| Path::new(name) == path)
+}
+
+/// Letters to add, drop or change (Levenshtein).
+fn distance(a: &str, b: &str) -> usize {
+    let mut row: Vec<usize> = (0..=b.chars().count()).collect();
+    for (i, x) in a.chars().enumerate() {
+        let mut diagonal = std::mem::replace(&mut row[0], i + 1);
+        for (j, y) in b.chars().enumerate() {
+            let changed = diagonal + usize::from(x != y);
+            diagonal = row[j + 1];
+            row[j + 1] = changed.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[b.chars().count()]
+}
+
+/// `sunfleck scenes`.
+pub fn list() -> Result<ExitCode> {
+    for name in NAMES {
+        crate::print(&format!("{name:<10} {}", describe(name)));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn describe(name: &str) -> &'static str {
+    match name {
+        "cornell" => "the box with a red and a green wall, a mirror ball and a glass ball",
+        "glass" => "a goblet of red wine and marbles under a small lamp",
+        "pool" => "sun through waves onto a mosaic floor, seen from the terrace",
+        "bathroom" => "lamps inside thick glass: no light arrives except through it",
+        "fireplace" => "a long room lit by hundreds of small flames and two candles",
+        _ => "",
+    }
+}
+
+/// `sunfleck export`.
+pub fn export(args: &ExportArgs) -> Result<ExitCode> {
+    let path = &args.output;
+    if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb")) {
+        bail!(Usage(format!("-o {}: an exported scene ends in .glb", path.display())));
+    }
+    atomic::check(path)?;
+    let source = Source::resolve(&args.scene)?;
+    let mut loaded = source.scene()?;
+    source.apply(&mut loaded)?;
+    let Loaded { scene, warnings } = loaded;
+    for warning in warnings {
+        eprintln!("sunfleck: warning: {}", crate::one_line(&warning));
+    }
+    let bytes = glb_bytes(&scene)?;
+    atomic::write(path, |writer| writer.write_all(&bytes))?;
+    eprintln!("wrote {}", path.display());
+    if let Some(mut environment) = scene.environment {
+        environment.texels.iter_mut().for_each(|texel| *texel *= environment.strength);
+        let beside = path.with_extension("hdr");
+        export::write_environment_hdr(&environment, &beside)?;
+        let turned = match environment.rotation {
+            0.0 => String::new(),
+            rotation => format!(", turned by {} degrees", rotation.to_degrees()),
+        };
+        eprintln!("wrote {}: glTF has no environment; render with --env {0}{turned}", beside.display());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_scene_has_a_line() {
+        assert!(NAMES.iter().all(|name| !describe(name).is_empty()));
+    }
+
+    #[test]
+    fn distances() {
+        assert_eq!(distance("glass", "glass"), 0);
+        assert_eq!(distance("glass", "glas"), 1);
+        assert_eq!(distance("cornell", "cornel box"), 4);
+        assert_eq!(distance("", "pool"), 4);
+    }
+}
