@@ -6,7 +6,9 @@ mod cli;
 mod backends;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
+mod layering;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod layout;
-mod layering;
+#[cfg(feature = "render")]
+mod loading;
 mod physics;
