@@ -21,12 +21,12 @@ fn trace_eye(
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let index = thread_index(workgroup, workgroups, local, 64u);
-    if index >= arguments.values.x {
+    var xy = tile_pixel(workgroup, workgroups, local, frame.width);
+    if xy.x >= frame.width || xy.y >= arguments.values.x {
         return;
     }
-    let i = arguments.values.y + index;
-    let xy = vec2(i % frame.width, i / frame.width);
+    let index = xy.y * frame.width + xy.x;
+    xy.y += arguments.values.y;
     let pixel = (frame.crop_y + xy.y) * frame.full_width + frame.crop_x + xy.x;
     var rng = rng_new(STREAM_EYE, pixel, frame.iteration, frame.seed);
     let start = camera_ray(xy, rng_next4(&rng));
