@@ -30,8 +30,6 @@ fn trace_eye(
     let pixel = (frame.crop_y + xy.y) * frame.full_width + frame.crop_x + xy.x;
     var rng = rng_new(STREAM_EYE, pixel, frame.iteration, frame.seed);
     let start = camera_ray(xy, rng_next4(&rng));
-    var origin = start.origin;
-    var direction = start.direction;
     let longest = min(frame.max_eye_segments, frame.max_segments);
     var vertex = EyeVertex();
     var radiance = vec3(0.0);
@@ -41,18 +39,37 @@ fn trace_eye(
     var segments = 0u;
     // The last ray only looks whether the direction sampled where photons are gathered leads straight to a light.
     var last = false;
-    var alpha_seed = rng_alpha_seed(rng);
-    while segments < longest || last {
-        let ray = Ray(origin, direction, FAR, alpha_seed, select(SEER_EYE, SEER_LIGHT, last));
-        if !last {
+    // Whether there is another ray after the one towards a light.
+    var goes_on = true;
+    // Rays towards lights take turns with those of the path, so that the code of the search is there once.
+    var to_light = false;
+    var pending = vec3(0.0);
+    var light_ray: Ray;
+    var ray = Ray(start.origin, start.direction, FAR, rng_alpha_seed(rng), SEER_EYE);
+    for (var step = 0u; step < 2u * longest + 2u; step++) {
+        if !to_light && !(goes_on && (segments < longest || last)) {
+            break;
+        }
+        var traced = ray;
+        if to_light {
+            traced = light_ray;
+        } else if !last {
             segments += 1u;
         }
-        let hit = trace_walk(ray, false);
+        let hit = trace_walk(traced, to_light);
+        if to_light {
+            to_light = false;
+            if hit.primitive == NONE {
+                radiance += pending;
+            }
+            continue;
+        }
+        let direction = ray.direction;
         if hit.primitive == NONE {
             radiance += throughput * light_environment(direction) * balance(pdf, light_environment_pdf(direction));
             break;
         }
-        let s = surface_at(hit, origin, direction);
+        let s = surface_at(hit, ray.origin, direction);
         throughput *= absorbed(s, medium, hit.t);
         if any(s.emission != vec3(0.0)) {
             radiance += throughput * s.emission * balance(pdf, light_area_pdf(s.light, hit.t, dot(s.normal, direction)));
@@ -60,10 +77,10 @@ fn trace_eye(
         if last {
             break;
         }
-        let bsdf = bsdf_new(s);
         let outgoing = -direction;
+        let bsdf = bsdf_new(s, outgoing);
         let u = rng_next4(&rng);
-        let follow = bsdf_follow_probability(bsdf, outgoing);
+        let follow = bsdf_follow_probability(bsdf);
         let stop = u.x >= follow;
         throughput /= select(follow, 1.0 - follow, stop);
         var lobes = bsdf_traced(bsdf);
@@ -75,73 +92,56 @@ fn trace_eye(
             vertex.throughput = throughput;
         }
         if sample_lights {
-            radiance += throughput * eye_direct(bsdf, s, outgoing, medium, lobes, &rng);
+            // Directions the BSDF samples are followed as well, and the two share the light between them.
+            light_ray.alpha_seed = rng_alpha_seed(rng);
+            let w = rng_next4(&rng);
+            let incoming = light_sample(s.position, w.xyz);
+            let f = bsdf_evaluate(bsdf, outgoing, incoming.direction, lobes, RADIANCE);
+            if incoming.pdf > 0.0 && any(f * incoming.light != vec3(0.0)) {
+                var share = 1.0;
+                if !incoming.point_like && !bsdf_is_diffuse(bsdf) {
+                    share = incoming.pdf / (incoming.pdf + bsdf_pdf(bsdf, outgoing, incoming.direction, lobes));
+                }
+                let cosine = abs(dot(bsdf.frame.z, incoming.direction));
+                let arriving = f * incoming.light * (cosine * share / incoming.pdf);
+                pending = throughput * (arriving * transmittance(medium, incoming.distance));
+                light_ray.origin = trace_leave(s.position, s.normal, incoming.direction);
+                light_ray.direction = incoming.direction;
+                // A little short of the light itself.
+                light_ray.t_max = incoming.distance * (1.0 - 1e-4);
+                light_ray.seer = SEER_LIGHT;
+                to_light = true;
+            }
         }
-        if stop && !(sample_lights && !bsdf_is_diffuse(bsdf) && tables.has_extended != 0u) {
-            break;
+        goes_on = !stop || (sample_lights && !bsdf_is_diffuse(bsdf) && tables.has_extended != 0u);
+        if !goes_on {
+            continue;
         }
         last = stop;
-        alpha_seed = rng_alpha_seed(rng);
+        ray.alpha_seed = rng_alpha_seed(rng);
         let v = rng_next4(&rng);
         let scatter = bsdf_sample(bsdf, outgoing, lobes, RADIANCE, v.xyz);
-        if !scatter.ok {
-            break;
-        }
+        goes_on = scatter.ok;
         throughput *= scatter.weight;
         pdf = scatter.pdf;
         if !last {
             if (frame.flags & FRAME_ROULETTE) != 0u && segments > ROULETTE_AFTER {
                 let survive = min(max_element(throughput), 0.95);
-                if v.w >= survive {
-                    break;
-                }
+                goes_on = goes_on && v.w < survive;
                 throughput /= survive;
             }
-            alpha_seed = rng_alpha_seed(rng);
+            ray.alpha_seed = rng_alpha_seed(rng);
         }
         if scatter.transmitted {
             medium = beyond(s);
         }
-        direction = scatter.direction;
-        origin = trace_leave(s.position, s.normal, direction);
+        ray.direction = scatter.direction;
+        ray.origin = trace_leave(s.position, s.normal, scatter.direction);
+        ray.seer = select(SEER_EYE, SEER_LIGHT, last);
     }
     vertex.flags |= segments << 8u;
     vertex.radiance = radiance;
     eye_vertices[index] = vertex;
-}
-
-// Light sampled towards the surface. Directions the BSDF samples are followed as well, and the two share the light
-// between them.
-fn eye_direct(
-    bsdf: Bsdf,
-    s: Surface,
-    outgoing: vec3<f32>,
-    medium: vec3<f32>,
-    lobes: u32,
-    rng: ptr<function, Rng>,
-) -> vec3<f32> {
-    let alpha_seed = rng_alpha_seed(*rng);
-    let u = rng_next4(rng);
-    let incoming = light_sample(s.position, u.xyz);
-    if incoming.pdf <= 0.0 {
-        return vec3(0.0);
-    }
-    let f = bsdf_evaluate(bsdf, outgoing, incoming.direction, lobes, RADIANCE);
-    if all(f == vec3(0.0)) || all(incoming.light == vec3(0.0)) {
-        return vec3(0.0);
-    }
-    let cosine = abs(dot(bsdf.frame.z, incoming.direction));
-    var share = 1.0;
-    if !incoming.point_like && !bsdf_is_diffuse(bsdf) {
-        share = incoming.pdf / (incoming.pdf + bsdf_pdf(bsdf, outgoing, incoming.direction, lobes));
-    }
-    let origin = trace_leave(s.position, s.normal, incoming.direction);
-    // A little short of the light itself.
-    let ray = Ray(origin, incoming.direction, incoming.distance * (1.0 - 1e-4), alpha_seed, SEER_LIGHT);
-    if trace_walk(ray, true).primitive != NONE {
-        return vec3(0.0);
-    }
-    return f * incoming.light * (cosine * share / incoming.pdf) * transmittance(medium, incoming.distance);
 }
 
 fn eye_fill(bsdf: Bsdf, s: Surface, outgoing: vec3<f32>) -> EyeVertex {
@@ -151,7 +151,7 @@ fn eye_fill(bsdf: Bsdf, s: Surface, outgoing: vec3<f32>) -> EyeVertex {
     vertex.position = s.position;
     vertex.flags = EYE_GATHER | select(0u, EYE_GLOSSY, glossy);
     vertex.normal = oct_encode(s.normal);
-    vertex.diffuse = bsdf_diffuse(bsdf, dot(bsdf.frame.z, outgoing));
+    vertex.diffuse = bsdf_diffuse(bsdf, bsdf.known_albedo);
     vertex.shading_normal = oct_encode(s.shading_normal);
     vertex.base_color = s.base_color;
     vertex.outgoing = oct_encode(outgoing);

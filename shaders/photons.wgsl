@@ -67,8 +67,8 @@ fn photon_step(state: ptr<function, PathState>, slot: u32) -> bool {
     }
     let s = surface_at(hit, ray.origin, ray.direction);
     let power = (*state).power * absorbed(s, (*state).medium, hit.t);
-    let bsdf = bsdf_new(s);
     let incoming = -ray.direction;
+    let bsdf = bsdf_new(s, incoming);
     let is_direct = (*state).segments == 1u;
     let store = bsdf_gathered(bsdf) != 0u && !(is_direct && (frame.flags & FRAME_SAMPLE_DIRECT) != 0u);
     if store {

@@ -28,6 +28,8 @@ struct Bsdf {
     // Far side over known side.
     eta: f32,
     volume: bool,
+    // Directional albedo of the lobe for the known direction.
+    known_albedo: vec2<f32>,
 }
 
 // A sampled direction; `ok` is false where the light ends.
@@ -54,7 +56,7 @@ struct Choice {
 }
 
 fn bsdf_of_vertex(v: EyeVertex) -> Bsdf {
-    return Bsdf(
+    let b = Bsdf(
         basis_around(oct_decode(v.shading_normal)),
         oct_decode(v.normal),
         v.base_color,
@@ -66,7 +68,18 @@ fn bsdf_of_vertex(v: EyeVertex) -> Bsdf {
         v.transmission,
         v.eta,
         (v.material_flags & MATERIAL_VOLUME) != 0u,
+        vec2(0.0),
     );
+    return bsdf_with_known(b, oct_decode(v.outgoing));
+}
+
+// With what depends on the known direction alone.
+fn bsdf_with_known(b: Bsdf, known: vec3<f32>) -> Bsdf {
+    var with_known = b;
+    if !bsdf_is_diffuse(b) {
+        with_known.known_albedo = bsdf_lobe_albedo(b, max(dot(b.frame.z, known), 0.0));
+    }
+    return with_known;
 }
 
 fn bsdf_is_smooth(b: Bsdf) -> bool {
@@ -114,15 +127,16 @@ fn bsdf_metal_albedo(b: Bsdf, ab: vec2<f32>) -> vec3<f32> {
     return (b.base_color * ab.x + ab.y) * bsdf_compensation(b.base_color, ab);
 }
 
-fn bsdf_diffuse(b: Bsdf, cos_eye: f32) -> vec3<f32> {
+// `ab` is the albedo of the lobe for the eye's direction, here and below.
+fn bsdf_diffuse(b: Bsdf, ab: vec2<f32>) -> vec3<f32> {
     let base = b.base_color * (bsdf_plastic(b) * FRAC_1_PI);
     if b.f90 == 0.0 {
         return base;
     }
-    return base * (1.0 - bsdf_coat_albedo(b, bsdf_lobe_albedo(b, cos_eye)));
+    return base * (1.0 - bsdf_coat_albedo(b, ab));
 }
 
-fn bsdf_specular(b: Bsdf, known: vec3<f32>, other: vec3<f32>, transport: u32) -> vec3<f32> {
+fn bsdf_specular(b: Bsdf, known: vec3<f32>, other: vec3<f32>, transport: u32, ab: vec2<f32>) -> vec3<f32> {
     if bsdf_is_smooth(b) || bsdf_is_diffuse(b) || known.z <= 0.0 || other.z == 0.0 {
         return vec3(0.0);
     }
@@ -140,7 +154,6 @@ fn bsdf_specular(b: Bsdf, known: vec3<f32>, other: vec3<f32>, transport: u32) ->
         if !reflected {
             return b.base_color * (bsdf_glass(b) * (1.0 - through) * lobe);
         }
-        let ab = bsdf_lobe_albedo(b, select(other.z, known.z, transport == RADIANCE));
         let grazing = pow5(1.0 - cosine);
         let coat = (b.f0 + (b.f90 - b.f0) * grazing) * bsdf_compensation(b.f0, ab);
         let metal = (b.base_color + (1.0 - b.base_color) * grazing) * bsdf_compensation(b.base_color, ab);
@@ -164,12 +177,16 @@ fn bsdf_specular(b: Bsdf, known: vec3<f32>, other: vec3<f32>, transport: u32) ->
 }
 
 fn bsdf_local(b: Bsdf, k: vec3<f32>, o: vec3<f32>, lobes: u32, transport: u32) -> vec3<f32> {
+    var ab = b.known_albedo;
+    if transport == IMPORTANCE && o.z > 0.0 && !bsdf_is_diffuse(b) {
+        ab = bsdf_lobe_albedo(b, o.z);
+    }
     var f = vec3(0.0);
     if (lobes & LOBE_DIFFUSE) != 0u && o.z > 0.0 {
-        f += bsdf_diffuse(b, select(o.z, k.z, transport == RADIANCE));
+        f += bsdf_diffuse(b, ab);
     }
     if (lobes & LOBE_SPECULAR) != 0u {
-        f += bsdf_specular(b, k, o, transport);
+        f += bsdf_specular(b, k, o, transport, ab);
     }
     return f;
 }
@@ -184,11 +201,11 @@ fn bsdf_evaluate(b: Bsdf, known: vec3<f32>, other: vec3<f32>, lobes: u32, transp
     return bsdf_local(b, k, o, lobes, transport);
 }
 
-fn bsdf_choice(b: Bsdf, cos_known: f32, lobes: u32) -> Choice {
+fn bsdf_choice(b: Bsdf, lobes: u32) -> Choice {
     if bsdf_is_diffuse(b) {
         return Choice(select(0.0, 1.0, (lobes & LOBE_DIFFUSE) != 0u), 0.0, 0.0);
     }
-    let ab = bsdf_lobe_albedo(b, cos_known);
+    let ab = b.known_albedo;
     let coat = bsdf_coat_albedo(b, ab);
     var choice = Choice(0.0, 0.0, 0.0);
     if (lobes & LOBE_DIFFUSE) != 0u {
@@ -209,14 +226,14 @@ fn bsdf_choice(b: Bsdf, cos_known: f32, lobes: u32) -> Choice {
     return Choice(choice.diffuse * scale, choice.coat * scale, choice.glass * scale);
 }
 
-fn bsdf_follow_probability(b: Bsdf, known: vec3<f32>) -> f32 {
+fn bsdf_follow_probability(b: Bsdf) -> f32 {
     if (bsdf_traced(b) & LOBE_SPECULAR) == 0u {
         return 0.0;
     }
     if (bsdf_gathered(b) & LOBE_DIFFUSE) == 0u {
         return 1.0;
     }
-    let choice = bsdf_choice(b, max(dot(b.frame.z, known), 0.0), LOBES_ALL);
+    let choice = bsdf_choice(b, LOBES_ALL);
     return clamp(1.0 - choice.diffuse, 0.1, 0.9);
 }
 
@@ -227,7 +244,7 @@ fn bsdf_pdf(b: Bsdf, known: vec3<f32>, other: vec3<f32>, lobes: u32) -> f32 {
     if k.z <= 0.0 || o.z * dot(other, b.normal) <= 0.0 {
         return 0.0;
     }
-    return bsdf_local_pdf(b, k, o, bsdf_choice(b, k.z, lobes));
+    return bsdf_local_pdf(b, k, o, bsdf_choice(b, lobes));
 }
 
 fn bsdf_local_pdf(b: Bsdf, k: vec3<f32>, o: vec3<f32>, choice: Choice) -> f32 {
@@ -271,7 +288,7 @@ fn bsdf_sample(b: Bsdf, known: vec3<f32>, lobes: u32, transport: u32, u: vec3<f3
     if k.z <= 0.0 {
         return ENDED;
     }
-    let choice = bsdf_choice(b, k.z, lobes);
+    let choice = bsdf_choice(b, lobes);
     var found: Weighed;
     // Where the direction comes first and its weight follows.
     var weigh = false;

@@ -2,10 +2,10 @@
 #import surface
 #import bsdf
 
-fn bsdf_new(s: Surface) -> Bsdf {
+fn bsdf_new(s: Surface, known: vec3<f32>) -> Bsdf {
     let m = material_at(s.material);
     let volume = (m.flags & MATERIAL_VOLUME) != 0u;
-    return Bsdf(
+    let b = Bsdf(
         basis_around(s.shading_normal),
         s.normal,
         s.base_color,
@@ -17,7 +17,9 @@ fn bsdf_new(s: Surface) -> Bsdf {
         s.transmission,
         select(m.ior, 1.0 / m.ior, volume && !s.front),
         volume,
+        vec2(0.0),
     );
+    return bsdf_with_known(b, known);
 }
 
 // What is left after `t` metres to the surface. A back face knows what is behind it better than the path does.

@@ -372,3 +372,36 @@ fn speed() {
         }
     }
 }
+
+/// CPU seconds of this process so far.
+fn cpu_seconds() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let after_name = stat.rsplit(')').next().unwrap_or_default();
+    let ticks: f64 = after_name.split_whitespace().skip(11).take(2).filter_map(|t| t.parse::<f64>().ok()).sum();
+    ticks / 100.0
+}
+
+/// Not a test: `MESA_SHADER_CACHE_DISABLE=true cargo test --test it compile_times -- --ignored --nocapture`.
+#[test]
+#[ignore = "prints times"]
+fn compile_times() {
+    let scene = Scene { cameras: everything().cameras, ..Scene::default() };
+    let Some((_, mut gpu)) = backends(&scene) else { return };
+    gpu.set_first_radii(&vec![0.1; (SIZE * SIZE) as usize]).expect("radii");
+    let frame = Params { n_paths: 64, ..params() }.frame(1);
+    let mut last = cpu_seconds();
+    let mut lap = |what: &str| {
+        let now = cpu_seconds();
+        println!("{what}: {:.2} CPU s", now - last);
+        last = now;
+    };
+    gpu.trace_eye(&frame).and_then(|()| gpu.times()).expect("eye");
+    lap("eye");
+    gpu.trace_photons(&frame).and_then(|()| gpu.times()).expect("photons");
+    lap("photons");
+    gpu.set_photons(&[Photon::default(); 100]).expect("photons");
+    gpu.build_index(&frame).and_then(|()| gpu.times()).expect("build");
+    lap("build");
+    gpu.gather(&frame).and_then(|()| gpu.times()).expect("gather");
+    lap("gather");
+}
