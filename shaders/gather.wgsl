@@ -1,14 +1,13 @@
 // Density estimate at each eye vertex: the photons within its radius, found in the implicit tree.
 #import common
 #import oct
+#import bsdf
 
 @group(0) @binding(0) var<storage, read> eye_vertices: array<EyeVertex>;
 @group(0) @binding(1) var<storage, read> first_radii: array<f32>;
 @group(0) @binding(2) var<storage, read> photons: array<Photon>;
 @group(0) @binding(3) var<storage, read> boxes: array<PointBox>;
 @group(0) @binding(4) var<storage, read_write> radiance: array<vec4<f32>>;
-
-const PI: f32 = 3.14159265;
 
 // (first box, number of boxes) of a level.
 fn level_of(level: u32) -> vec2<u32> {
@@ -45,7 +44,10 @@ fn gather(
     let normal = oct_decode(vertex.normal);
     let shading_normal = oct_decode(vertex.shading_normal);
     let glossy = (vertex.flags & EYE_GLOSSY) != 0u;
-    let two_sided = vertex.transmission > 0.0;
+    // Light is gathered on both sides where some of it comes through.
+    let two_sided = glossy && vertex.transmission > 0.0;
+    let bsdf = bsdf_of_vertex(vertex);
+    let outgoing = oct_decode(vertex.outgoing);
     let eye_segments = (vertex.flags >> 8u) & 0xffu;
     let constant_kernel = (frame.flags & FRAME_CONSTANT_KERNEL) != 0u;
     let radius = first_radii[pixel] * frame.radius_scale;
@@ -93,7 +95,7 @@ fn gather(
                     diffuse += flux;
                 }
                 if glossy {
-                    other += flux * evaluate_glossy(vertex, shading_normal, direction);
+                    other += flux * bsdf_evaluate(bsdf, outgoing, direction, LOBE_SPECULAR, RADIANCE);
                 }
             }
         }
@@ -111,9 +113,4 @@ fn gather(
     }
     let estimate = (vertex.diffuse * diffuse + other) / (PI * radius2 * f32(frame.n_paths));
     radiance[pixel] = vec4(vertex.radiance + vertex.throughput * estimate, 0.0);
-}
-
-// All lobes but the diffuse one, 1/sr.
-fn evaluate_glossy(vertex: EyeVertex, shading_normal: vec3<f32>, direction: vec3<f32>) -> vec3<f32> {
-    return vec3(0.0);
 }

@@ -6,9 +6,12 @@ use super::buffers::{Array, Readback};
 use super::context::Context;
 use super::index::Index;
 use super::kernels::{Access, Batch, Kernel, Modules, Shared};
+use super::photons::PhotonPaths;
+use super::scene::SceneBuffers;
 use super::timer::{Stage, Timer};
 use crate::layout::{Camera, EyeVertex, Frame, Photon, PointBox};
 use crate::ppm::{Error, Film, StageTimes, Stages};
+use crate::scene::PackedScene;
 
 /// Threads a workgroup.
 const THREADS: u32 = 64;
@@ -24,6 +27,8 @@ pub struct GpuStages {
     context: Arc<Context>,
     shared: Shared,
     camera: Camera,
+    trace_eye: Arc<Kernel>,
+    paths: PhotonPaths,
     index: Index,
     gather: Arc<Kernel>,
     accumulate: Arc<Kernel>,
@@ -40,16 +45,20 @@ pub struct GpuStages {
     n_photons: u32,
     film_size: [u32; 2],
     n_iterations: u32,
+    /// Pixels a dispatch of eye paths handles.
+    eye_chunk: u32,
     /// Pixels a gather dispatch handles.
     gather_chunk: u32,
 }
 
 impl GpuStages {
-    /// To come: the scene.
-    pub fn new(context: Arc<Context>, camera: Camera) -> Result<Self, Error> {
+    /// Puts the scene on the device.
+    pub fn new(context: Arc<Context>, scene: &PackedScene, camera: Camera) -> Result<Self, Error> {
         use Access::{Read, Write};
-        let shared = Shared::new(&context);
+        let shared = Shared::new(&context, SceneBuffers::new(&context, scene, &camera)?);
         let modules = Modules::new(&context, &shared);
+        let trace_eye = modules.kernel("eye", "trace_eye", &[Write])?;
+        let paths = PhotonPaths::new(&modules)?;
         let index = Index::new(&modules)?;
         let gather = modules.kernel("gather", "gather", &[Read, Read, Read, Read, Write])?;
         let accumulate = modules.kernel("accumulate", "accumulate", &[Read, Write])?;
@@ -58,6 +67,8 @@ impl GpuStages {
             context,
             shared,
             camera,
+            trace_eye,
+            paths,
             index,
             gather,
             accumulate,
@@ -73,6 +84,7 @@ impl GpuStages {
             n_photons: 0,
             film_size: [0, 0],
             n_iterations: 0,
+            eye_chunk: FIRST_CHUNK,
             gather_chunk: FIRST_CHUNK,
         })
     }
@@ -139,12 +151,33 @@ impl Stages for GpuStages {
         self.camera
     }
 
-    fn trace_eye(&mut self, _frame: &Frame) -> Result<(), Error> {
-        Err(self.context.error("eye paths are still to come".to_owned()))
+    fn trace_eye(&mut self, frame: &Frame) -> Result<(), Error> {
+        let n_pixels = frame.width * frame.height;
+        self.reserve_pixels(n_pixels)?;
+        self.shared.set_frame(&self.context, frame);
+        let mut batch = Batch::new(&self.context, &self.shared, "eye");
+        self.timer.begin(Stage::Eye, &mut batch);
+        for (first, n) in Self::chunks(n_pixels, self.eye_chunk) {
+            if first > 0 {
+                batch.submit()?;
+                batch = Batch::new(&self.context, &self.shared, "eye");
+            }
+            let buffers = [self.eye_vertices.range(first, n)];
+            batch.dispatch(&self.trace_eye, &buffers, [n, first, 0, 0], n.div_ceil(THREADS));
+        }
+        self.timer.end(Stage::Eye, batch, &self.context)
     }
 
-    fn trace_photons(&mut self, _frame: &Frame) -> Result<(), Error> {
-        Err(self.context.error("photon paths are still to come".to_owned()))
+    fn trace_photons(&mut self, frame: &Frame) -> Result<(), Error> {
+        self.n_photons = self.paths.trace(
+            &self.context,
+            &self.shared,
+            frame,
+            &mut self.photons,
+            &mut self.readback,
+            &mut self.timer,
+        )?;
+        Ok(())
     }
 
     fn build_index(&mut self, frame: &Frame) -> Result<(), Error> {
@@ -245,10 +278,12 @@ impl Stages for GpuStages {
 
     fn times(&mut self) -> Result<StageTimes, Error> {
         let times = self.timer.read(&self.context, &self.shared, &mut self.readback)?;
-        if times.gather > 0.0 {
-            let pixels = f64::from(self.n_pixels) * DISPATCH_SECONDS / times.gather;
-            let steps = (pixels / f64::from(PIXEL_STEP)).clamp(1.0, 256.0) as u32;
-            self.gather_chunk = steps * PIXEL_STEP;
+        for (seconds, chunk) in [(times.eye, &mut self.eye_chunk), (times.gather, &mut self.gather_chunk)] {
+            if seconds > 0.0 {
+                let pixels = f64::from(self.n_pixels) * DISPATCH_SECONDS / seconds;
+                let steps = (pixels / f64::from(PIXEL_STEP)).clamp(1.0, 256.0) as u32;
+                *chunk = steps * PIXEL_STEP;
+            }
         }
         Ok(times)
     }

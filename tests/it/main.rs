@@ -3,6 +3,8 @@
 #[cfg(feature = "render")]
 mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
+mod backends;
+#[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
 mod layering;
 #[cfg(all(feature = "render", feature = "gpu"))]
