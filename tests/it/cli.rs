@@ -501,3 +501,23 @@ fn scenes_and_export() {
     assert_error(&sunfleck(folder.path(), words("export cornell -o box.obj")), 2, &[".glb"]);
     assert_error(&sunfleck(folder.path(), words("export absent.glb -o b.glb")), 1, &["absent.glb"]);
 }
+
+#[cfg(feature = "gpu")]
+#[test]
+fn both_backends_make_the_same_picture() {
+    let folder = folder_with_floor();
+    let list = String::from_utf8(sunfleck(folder.path(), ["--list-devices"]).stdout).unwrap();
+    if list.lines().count() < 2 {
+        assert!(std::env::var_os("SUNFLECK_REQUIRE_GPU").is_none_or(|v| v != "1"), "no GPU adapter");
+        println!("skipped: no GPU adapter");
+        return;
+    }
+    let args = "render floor.gltf -r 32x16 --photons 2k --iterations 2 --radius 0.2";
+    for backend in ["cpu", "gpu"] {
+        let output = sunfleck(folder.path(), words(&format!("{args} --backend {backend} -o {backend}.exr")));
+        assert!(output.status.success(), "{}", stderr(&output));
+    }
+    let read = |name: &str| output::exr::read(&folder.path().join(name)).unwrap();
+    let difference = output::compare::compare(&read("gpu.exr"), &read("cpu.exr")).unwrap();
+    assert!(difference.rel_mse_trimmed < 1e-4 && difference.relative_mean_difference.abs() < 1e-3, "{difference:?}");
+}
