@@ -56,7 +56,7 @@ fn room(b: &mut Builder) {
         bevel: 0.003,
         bond: 0.5,
         tilt: 0.006,
-        variation: 0.10,
+        variation: 0.18,
         seed: 1,
     };
     let (mut ground, mut tiles) = (Shape::default(), Shape::default());
@@ -93,7 +93,7 @@ fn room(b: &mut Builder) {
         bevel: 0.002,
         bond: 0.0,
         tilt: 0.002,
-        variation: 0.03,
+        variation: 0.06,
         seed: 9,
     };
     for (name, color, parity) in [("floor tile, light", 0xD8D2C6, 0), ("floor tile, dark", 0x39424A, 1)] {
@@ -118,21 +118,19 @@ fn vanity(b: &mut Builder, chrome: usize, ceramic: usize) {
     let mut doors = Shape::default();
     for k in 0..4 {
         let x = -0.70 + 0.35 * k as f32;
-        doors.append(Shape::cuboid(Vec3::new(x + 0.004, 0.166, front - 0.002), Vec3::new(x + 0.346, 0.768, front + 0.018)));
+        doors.append(Shape::cuboid(
+            Vec3::new(x + 0.004, 0.166, front - 0.002),
+            Vec3::new(x + 0.346, 0.768, front + 0.018),
+        ));
     }
     b.add("doors", doors, oak);
     let mut pulls = Shape::default();
     for k in 0..4 {
         let x = -0.70 + 0.35 * k as f32 + if k % 2 == 0 { 0.31 } else { 0.04 };
-        let (y0, y1, z) = (0.56, 0.70, front + 0.042);
-        let path = [
-            Vec3::new(x, y0, front + 0.017),
-            Vec3::new(x, y0, z - 0.008),
-            Vec3::new(x, y0 + 0.012, z),
-            Vec3::new(x, y1 - 0.012, z),
-            Vec3::new(x, y1, z - 0.008),
-            Vec3::new(x, y1, front + 0.017),
-        ];
+        let path = [[0.0, 0.017], [0.0, 0.027], [0.010, 0.039], [0.028, 0.042]];
+        let lower = path.map(|[up, out]| Vec3::new(x, 0.56 + up, front + out));
+        let upper = path.map(|[up, out]| Vec3::new(x, 0.70 - up, front + out));
+        let path: Vec<Vec3> = lower.into_iter().chain(upper.into_iter().rev()).collect();
         pulls.append(Shape::tube(&spline(&path, 6), |_| 0.0045, 16));
     }
     b.add("pulls", pulls, chrome);
@@ -149,7 +147,8 @@ fn vanity(b: &mut Builder, chrome: usize, ceramic: usize) {
         .curve([0.200, 0.06], [0.16, 0.028], [0.024, 0.022], 22)
         .to(0.0, 0.0215);
     b.add("basin", basin.lathe(128).moved(place), ceramic);
-    let plug = Profile::start(0.026, 0.020).to(0.026, 0.0255).crease().curve([0.026, 0.028], [0.01, 0.029], [0.0, 0.029], 8);
+    let plug =
+        Profile::start(0.026, 0.020).to(0.026, 0.0255).crease().curve([0.026, 0.028], [0.01, 0.029], [0.0, 0.029], 8);
     b.add("plug", plug.lathe(48).moved(place), chrome);
 
     let root = Vec3::new(0.0, 0.814, back + 0.036);
@@ -279,7 +278,12 @@ fn lamp(b: &mut Builder, centre: Vec3, glass: usize, filament: usize, chrome: us
         Vec3::new(centre.x, centre.y + 0.150, wall + 0.005),
     ];
     arm.append(Shape::tube(&spline(&path, 10), |_| 0.008, 24));
-    let plate = Profile::start(0.0, 0.0).to(0.045, 0.0).to(0.045, 0.010).crease().curve([0.044, 0.018], [0.02, 0.02], [0.0, 0.02], 10);
+    let plate = Profile::start(0.0, 0.0).to(0.045, 0.0).to(0.045, 0.010).crease().curve(
+        [0.044, 0.018],
+        [0.02, 0.02],
+        [0.0, 0.02],
+        10,
+    );
     let upright = Quat::from_rotation_x(PI / 2.0);
     let pose = Affine3A::from_rotation_translation(upright, Vec3::new(centre.x, centre.y + 0.150, wall - 0.001));
     arm.append(plate.lathe(64).transformed(pose));
@@ -367,8 +371,8 @@ fn tub(b: &mut Builder, ceramic: usize, chrome: usize) {
         .curve([0.885, 0.60], [0.87, 0.57], [0.85, 0.50], 10)
         .curve([0.80, 0.22], [0.72, 0.11], [0.45, 0.10], 22)
         .to(0.0, 0.09);
-    let scale = Affine3A::from_translation(Vec3::new(1.08, 0.003, -0.02))
-        * Affine3A::from_scale(Vec3::new(0.42, 1.0, 0.92));
+    let scale =
+        Affine3A::from_translation(Vec3::new(1.08, 0.003, -0.02)) * Affine3A::from_scale(Vec3::new(0.42, 1.0, 0.92));
     b.add("tub", tub.lathe(160).transformed(scale), ceramic);
     let root = Vec3::new(1.08, 0.0, -1.10);
     let path = [

@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-use super::shape::Shape;
 use super::Builder;
+use super::shape::Shape;
 use crate::scene::{Material, Scene};
 
 /// Half the inner width, metres.

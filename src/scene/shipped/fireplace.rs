@@ -67,7 +67,7 @@ fn room(b: &mut Builder) {
 /// Chimney breast of brick, niche, hearth, mantel.
 fn chimney(b: &mut Builder) {
     let mortar = b.material(Material::diffuse("mortar", srgb(0x8C8378)));
-    let brick = b.material(Material::diffuse("brick", srgb(0x9C4F37)));
+    let brick = b.material(Material::diffuse("brick", srgb(0xB05C40)));
     let soot = b.material(Material::diffuse("sooty brick", srgb(0x443730)));
     let (w, h, back) = (NICHE.x, NICHE.y + HEARTH, NICHE.z);
     let (half, top) = (BREAST_HALF, MAX.y + 0.001);
@@ -95,13 +95,14 @@ fn chimney(b: &mut Builder) {
         bevel: 0.003,
         bond: 0.5,
         tilt: 0.02,
-        variation: 0.22,
+        variation: 0.38,
         seed: 4,
     };
     let lay = |faces: &[(Vec3, Vec3, Vec3)]| {
-        let parts = faces.iter().enumerate().map(|(k, &(corner, u, v))| {
-            Tiling { seed: 40 + k as u32, ..tiling }.over(corner, u, v, |_| true)
-        });
+        let parts = faces
+            .iter()
+            .enumerate()
+            .map(|(k, &(corner, u, v))| Tiling { seed: 40 + k as u32, ..tiling }.over(corner, u, v, |_| true));
         Shape::union(parts)
     };
     b.add("bricks", lay(&faces), brick);
@@ -127,7 +128,7 @@ fn chimney(b: &mut Builder) {
 /// Candlesticks and a vase on the mantel.
 fn candles(b: &mut Builder) {
     let brass = b.material(Material::metal("polished brass", Vec3::new(0.80, 0.60, 0.28), 0.12));
-    let wax = b.material(glossy("wax", srgb(0xEFE6CF), 0.35));
+    let wax = b.material(glossy("wax", srgb(0xEAE2CE), 0.35));
     let stick = Profile::start(0.0, 0.0)
         .to(0.042, 0.0)
         .crease()
@@ -153,6 +154,7 @@ fn candles(b: &mut Builder) {
         .curve([0.030, 0.23], [0.030, 0.25], [0.046, 0.275], 12)
         .curve([0.044, 0.279], [0.041, 0.277], [0.040, 0.272], 5)
         .curve([0.022, 0.25], [0.022, 0.23], [0.035, 0.21], 10)
+        .crease()
         .to(0.0, 0.20);
     b.add("vase", vase.lathe(96).moved(Vec3::new(0.58, 1.234, BREAST + 0.10)), vase_paint);
 }
@@ -215,7 +217,8 @@ fn fire(b: &mut Builder) {
         let (x, dz) = (0.28 * u, 0.13 * v);
         let reach = 0.36 * (1.0 - u.abs()).powf(0.8) + 0.04;
         let t = random.unit() * random.unit().max(0.55);
-        let from = Vec3::new(x * (1.0 - 0.45 * t), base + 0.09 + 0.07 * (1.0 - u.abs()) + reach * t, z + dz * (1.0 - 0.5 * t));
+        let from =
+            Vec3::new(x * (1.0 - 0.45 * t), base + 0.09 + 0.07 * (1.0 - u.abs()) + reach * t, z + dz * (1.0 - 0.5 * t));
         let hue = if t < 0.22 {
             0
         } else if t < 0.5 {
@@ -241,10 +244,7 @@ fn tongue(from: Vec3, along: Vec3, width: f32, turn: f32) -> Shape {
         from,
     );
     let length = along.length();
-    let profile = Profile::start(0.0, 0.0)
-        .to(width, 0.28 * length)
-        .to(0.6 * width, 0.60 * length)
-        .to(0.0, length);
+    let profile = Profile::start(0.0, 0.0).to(width, 0.28 * length).to(0.6 * width, 0.60 * length).to(0.0, length);
     profile.lathe(5).transformed(pose)
 }
 
@@ -283,7 +283,12 @@ fn fender(b: &mut Builder) {
     // A log basket would hide the fire; irons in a stand do not.
     let mut irons = Shape::default();
     let at = Vec3::new(-1.02, HEARTH - 0.001, BREAST + 0.24);
-    let foot = Profile::start(0.0, 0.0).to(0.085, 0.0).crease().to(0.085, 0.010).crease().curve([0.05, 0.02], [0.012, 0.02], [0.010, 0.05], 10);
+    let foot = Profile::start(0.0, 0.0).to(0.085, 0.0).crease().to(0.085, 0.010).crease().curve(
+        [0.05, 0.02],
+        [0.012, 0.02],
+        [0.010, 0.05],
+        10,
+    );
     irons.append(foot.to(0.010, 0.60).crease().to(0.0, 0.60).lathe(40).moved(at));
     irons.append(Shape::icosphere(at + Vec3::Y * 0.615, 0.022, 3));
     irons.append(Shape::torus(at + Vec3::Y * 0.50, 0.055, 0.005, 48, 12));
@@ -312,7 +317,9 @@ fn seats(b: &mut Builder) {
     for (k, (z, turn, color)) in [(-1.32, 0.35, 0xC8893B), (0.0, -0.25, 0xA23B30)].into_iter().enumerate() {
         let cloth = b.material(Material::diffuse(&format!("cushion {k}"), srgb(color)));
         let pose = Affine3A::from_rotation_translation(
-            Quat::from_rotation_y(std::f32::consts::FRAC_PI_2) * Quat::from_rotation_z(turn * 0.3) * Quat::from_rotation_x(1.20),
+            Quat::from_rotation_y(std::f32::consts::FRAC_PI_2)
+                * Quat::from_rotation_z(turn * 0.3)
+                * Quat::from_rotation_x(1.20),
             Vec3::new(-1.66, 0.66, z),
         );
         let pillow = furniture::cushion(Vec3::new(0.42, 0.09, 0.40), 0.035, 0.045);

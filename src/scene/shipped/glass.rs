@@ -45,9 +45,12 @@ impl Goblet {
         let inside = outside.curve([0.0440, 0.1630], [0.0540, 0.1390], [0.0543, 0.1160], 18);
         let rim_of_wine = inside.last_index();
         let rim = inside.last();
-        let all = inside
-            .curve([0.0544, 0.1090], [0.0536, 0.1030], [0.0514, 0.0960], 8)
-            .curve([0.0465, 0.0760], [0.0260, 0.0665], [0.0, 0.0655], 28);
+        let all = inside.curve([0.0544, 0.1090], [0.0536, 0.1030], [0.0514, 0.0960], 8).curve(
+            [0.0465, 0.0760],
+            [0.0260, 0.0665],
+            [0.0, 0.0655],
+            28,
+        );
         let plain = |_| (1.0, 0.0);
         // The wine climbs the wall by a millimetre and a half. From wall to axis: the air is above.
         let level = |d: f32| rim.y - 0.0015 * (1.0 - (-d / 0.0016).exp());
