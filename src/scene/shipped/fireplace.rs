@@ -195,7 +195,7 @@ fn fire(b: &mut Builder) {
     b.add("logs", wood, bark);
 
     let mut random = Random::new(404);
-    let ember = b.material(Material::emitter("ember", Vec3::new(660.0, 156.0, 30.0)));
+    let ember = b.material(Material::emitter("ember", Vec3::new(495.0, 117.0, 22.5)));
     let mut embers = Shape::default();
     for _ in 0..150 {
         let at = Vec3::new(
@@ -207,9 +207,9 @@ fn fire(b: &mut Builder) {
     }
     b.add("embers", embers, ember);
     let hues = [
-        ("flame core", Vec3::new(3120.0, 2220.0, 1200.0)),
-        ("flame", Vec3::new(2280.0, 1290.0, 504.0)),
-        ("flame tip", Vec3::new(1260.0, 516.0, 132.0)),
+        ("flame core", Vec3::new(2340.0, 1530.0, 720.0)),
+        ("flame", Vec3::new(1710.0, 855.0, 279.0)),
+        ("flame tip", Vec3::new(945.0, 315.0, 63.0)),
     ];
     let mut tongues: [Shape; 3] = Default::default();
     for _ in 0..340 {

@@ -103,8 +103,8 @@ pub(super) fn scene() -> Scene {
     b.add("wine against air", goblet.surface.moved(place), surface);
 
     for (k, (x, z, radius, color)) in [
-        (0.190, 0.028, 0.0125, 0x2E6FD0),
-        (0.176, -0.030, 0.0105, 0xF0A818),
+        (0.178, 0.004, 0.0240, 0x9CC8F0),
+        (0.140, -0.052, 0.0115, 0xF0A818),
         (-0.105, 0.075, 0.0115, 0x2FA860),
         (-0.008, 0.118, 0.0095, 0xE8E8F0),
     ]
@@ -118,7 +118,7 @@ pub(super) fn scene() -> Scene {
         b.add(&format!("marble {k}"), Shape::icosphere(Vec3::new(x, radius + 0.0007, z), radius, 5), material);
     }
 
-    let lamp = b.material(Material::emitter("lamp", Vec3::new(4600.0, 4050.0, 3300.0)));
+    let lamp = b.material(Material::emitter("lamp", Vec3::new(6400.0, 5700.0, 4750.0)));
     let (at, aim, half) = (Vec3::new(-0.66, 0.98, -0.36), Vec3::new(0.05, 0.06, 0.03), 0.012);
     let towards = (aim - at).normalize();
     let (u, v) = towards.any_orthonormal_pair();
