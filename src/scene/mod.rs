@@ -4,10 +4,6 @@
 //! emission (nits in glTF), intensity per steradian for point and spot lights (candela), irradiance for directional
 //! ones (lux). Colours are linear RGB with the sRGB primaries.
 
-pub mod export;
-pub mod load;
-pub mod shipped;
-
 use glam::{Affine3A, Mat2, Vec2, Vec3, Vec4};
 
 /// Everything a picture is computed from. Plain data: [`Scene::check`] says whether it can be rendered.
@@ -312,7 +308,15 @@ pub enum Projection {
 pub mod albedo;
 pub mod bvh;
 mod camera;
+pub mod check;
+pub mod defaults;
 mod environment;
+pub mod export;
+pub mod load;
 mod packed;
+pub mod settings;
+pub mod shipped;
 
+pub use check::SceneError;
 pub use packed::PackedScene;
+pub use settings::Settings;

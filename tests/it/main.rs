@@ -4,6 +4,9 @@
 mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
+mod layering;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod layout;
+#[cfg(feature = "render")]
+mod loading;
 mod physics;

@@ -9,8 +9,7 @@ use clap::{Args, Parser, Subcommand};
 use sunfleck::output::VERSION;
 use sunfleck::output::tonemap::ToneMap;
 use sunfleck::ppm::{Direct, FirstRadius, Kernel};
-
-use crate::shim::parse_count;
+use sunfleck::scene::settings::parse_count;
 
 /// Exit code of a command line that makes no sense.
 pub const USAGE: u8 = 2;
@@ -101,7 +100,7 @@ pub struct RenderArgs {
     pub save_every: Option<f64>,
 
     /// Stop after so many iterations [default without --seconds: 256, or after a minute]
-    #[arg(long, visible_alias = "spp", value_name = "N", allow_hyphen_values = true, value_parser = count, help_heading = "Budget")]
+    #[arg(long, visible_alias = "spp", value_name = "N", allow_hyphen_values = true, value_parser = parse_count, help_heading = "Budget")]
     pub iterations: Option<u32>,
 
     /// Stop after so many seconds of iterations; with --iterations, whichever comes first
@@ -125,7 +124,7 @@ pub struct RenderArgs {
     pub env: Option<PathBuf>,
 
     /// Photon paths an iteration, such as 500k or 2M [default: 500k]
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count, help_heading = "Estimator")]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = parse_count, help_heading = "Estimator")]
     pub photons: Option<u32>,
 
     /// First radius, metres, or `automatic`: one per pixel from its footprint and a first photon pass
@@ -145,7 +144,7 @@ pub struct RenderArgs {
     pub direct: Option<Direct>,
 
     /// Longest path from lamp to lens, segments [default: no limit, Russian roulette ends paths]
-    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count, help_heading = "Estimator")]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = parse_count, help_heading = "Estimator")]
     pub max_segments: Option<u32>,
 
     /// The setting of the literature: five segments a side, no Russian roulette, photons carry everything, one radius
@@ -271,13 +270,6 @@ fn size(text: &str) -> Result<[u32; 2], String> {
         Err(_) => Err(format!("{t:?} is not a number of pixels; a size looks like 1280x720")),
     };
     Ok([side(width)?, side(height)?])
-}
-
-fn count(text: &str) -> Result<u32, String> {
-    match parse_count(text)? {
-        0 => Err("must be at least 1".into()),
-        n => Ok(n),
-    }
 }
 
 fn number<T: std::str::FromStr>(text: &str) -> Result<T, String> {

@@ -1,18 +1,18 @@
 //! What is to be rendered: the command line over the settings file over the defaults, checked before anything slow.
 
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};
 use sunfleck::layout::EyeVertex;
 use sunfleck::output::atomic;
 use sunfleck::output::png::Look;
-use sunfleck::ppm::{Direct, FirstRadius, Params};
-use sunfleck::scene::{Camera, Scene};
+use sunfleck::ppm::{Direct, FirstRadius, Kernel, Params};
+use sunfleck::scene::defaults::{add_default_light, default_camera};
+use sunfleck::scene::load::{Loaded, load_environment};
+use sunfleck::scene::{Camera, Scene, settings};
 
 use crate::cli::{RenderArgs, Usage};
-use crate::scenes;
-use crate::shim::{self, Settings};
+use crate::scenes::Source;
 
 /// Where nothing is said: as many iterations as look good on the shipped scenes, but no longer than one waits for.
 const DEFAULT_ITERATIONS: u32 = 256;
@@ -26,14 +26,14 @@ const PAPER_SEGMENTS: u32 = 5;
 #[derive(Clone, Copy, Debug)]
 pub struct Budget {
     pub iterations: Option<u32>,
-    pub time: Option<Duration>,
+    pub seconds: Option<f64>,
 }
 
 impl Budget {
     /// How much of it is used up, from 0 to 1.
-    pub fn spent(&self, iterations: u32, time: Duration) -> f64 {
+    pub fn spent(&self, iterations: u32, seconds: f64) -> f64 {
         let by_iterations = self.iterations.map_or(0.0, |n| f64::from(iterations) / f64::from(n));
-        let by_time = self.time.map_or(0.0, |t| time.as_secs_f64() / t.as_secs_f64());
+        let by_time = self.seconds.map_or(0.0, |limit| seconds / limit);
         by_iterations.max(by_time).min(1.0)
     }
 }
@@ -50,8 +50,7 @@ pub struct Job {
     pub budget: Budget,
     /// One radius for all pixels, the median of the automatic ones.
     pub one_radius: bool,
-    settings: Settings,
-    file: PathBuf,
+    source: Source,
 }
 
 /// What the stages read.
@@ -68,39 +67,55 @@ impl Job {
         let scene_name =
             args.scene.clone().ok_or_else(|| Usage("which scene? sunfleck render SCENE -o out.png".into()))?;
         check_outputs(args)?;
-        let (file, mut settings) = scenes::resolve(&scene_name)?;
+        let mut source = Source::resolve(&scene_name)?;
+        let settings = &mut source.settings;
         for pair in &args.set {
             settings.set(pair).map_err(|e| Usage(format!("--set {pair}: {e}")))?;
         }
-        let budget = match (args.iterations, args.seconds) {
-            (None, None) => (Some(DEFAULT_ITERATIONS), Some(DEFAULT_SECONDS)),
-            given => given,
+        // What the command line names replaces what the file says, and is not looked for.
+        settings.environment = settings.environment.take().filter(|_| args.env.is_none());
+        settings.camera = settings.camera.take().filter(|_| args.camera.is_none());
+        let iterations = args.iterations.or(settings.iterations.map(|n| n.0));
+        let budget = match (iterations, args.seconds.or(settings.seconds)) {
+            (None, None) => Budget { iterations: Some(DEFAULT_ITERATIONS), seconds: Some(DEFAULT_SECONDS) },
+            (iterations, seconds) => Budget { iterations, seconds },
         };
+        let radius = args.radius.or(settings.radius.map(first_radius)).unwrap_or_default();
         Ok(Self {
             scene_name,
             outputs: args.output.clone(),
             look: Look { exposure: args.exposure.or(settings.exposure), tonemap: args.tonemap.unwrap_or_default() },
-            budget: Budget { iterations: budget.0, time: budget.1.map(Duration::from_secs_f64) },
-            one_radius: args.paper && args.radius.or(settings.radius).is_none_or(|r| r == FirstRadius::Automatic),
-            settings,
-            file,
+            budget,
+            one_radius: args.paper && radius == FirstRadius::Automatic,
+            source,
         })
     }
 
     /// Reads the scene and chooses the camera and the estimator's parameters.
     pub fn load(&self, args: &RenderArgs) -> Result<Input> {
-        let (mut scene, warnings) = scenes::load(&self.file)?;
-        self.settings.apply_to_scene(&mut scene)?;
-        if scene.cameras.is_empty() {
-            scene.cameras.push(shim::default_camera(&scene));
+        let mut loaded = self.source.scene()?;
+        if let Some(path) = &args.env {
+            let (environment, warnings) = load_environment(path)?;
+            loaded.scene.environment = Some(environment);
+            loaded.warnings.extend(warnings);
         }
-        let camera = camera(&scene, args.camera.as_ref().or(self.settings.camera.as_ref()))?;
+        self.source.apply(&mut loaded)?;
+        let Loaded { mut scene, mut warnings } = loaded;
+        warnings.extend(add_default_light(&mut scene));
+        if scene.cameras.is_empty() {
+            scene.cameras.push(default_camera(&scene));
+        }
+        scene.check().with_context(|| self.scene_name.clone())?;
+        let camera = camera(&scene, args.camera.as_deref())?;
         let params = self.params(args, &camera)?;
         Ok(Input { scene, camera, params, warnings })
     }
 
+    /// The command line over the settings over the defaults.
     fn params(&self, args: &RenderArgs, camera: &Camera) -> Result<Params> {
-        let [width, height] = args.resolution.or(self.settings.size).unwrap_or_else(|| default_size(camera));
+        let settings = &self.source.settings;
+        let size = args.resolution.or(settings.size.map(|size| size.0));
+        let [width, height] = size.unwrap_or_else(|| default_size(camera));
         let mut params = Params::new(width, height);
         if args.paper {
             params.direct = Direct::Photons;
@@ -109,23 +124,43 @@ impl Job {
             params.max_photon_segments = PAPER_SEGMENTS;
         }
         if let Some(crop) = args.crop {
-            params.crop = crop
-                .pixels(params.size)
-                .ok_or_else(|| Usage(format!("--crop: no pixel of {width}x{height} is left")))?;
+            let nothing = || Usage(format!("--crop: no pixel of {width}x{height} is left"));
+            params.crop = crop.pixels(params.size).ok_or_else(nothing)?;
         }
-        params.seed = args.seed.unwrap_or(params.seed);
-        params.n_paths = args.photons.or(self.settings.photons).unwrap_or(params.n_paths);
-        params.alpha = args.alpha.or(self.settings.alpha).unwrap_or(params.alpha);
-        params.radius = args.radius.or(self.settings.radius).unwrap_or(params.radius);
-        params.kernel = args.kernel.unwrap_or(params.kernel);
-        params.direct = args.direct.unwrap_or(params.direct);
-        if let Some(n) = args.max_segments {
+        params.seed = args.seed.or(settings.seed).unwrap_or(params.seed);
+        params.n_paths = args.photons.or(settings.photons.map(|n| n.0)).unwrap_or(params.n_paths);
+        params.alpha = args.alpha.or(settings.alpha).unwrap_or(params.alpha);
+        params.radius = args.radius.or(settings.radius.map(first_radius)).unwrap_or(params.radius);
+        params.kernel = args.kernel.or(settings.kernel.map(kernel)).unwrap_or(params.kernel);
+        params.direct = args.direct.or(settings.direct.map(direct)).unwrap_or(params.direct);
+        if let Some(n) = args.max_segments.or(settings.max_segments) {
             params.max_segments = n;
             params.max_eye_segments = params.max_eye_segments.min(n);
             params.max_photon_segments = params.max_photon_segments.min(n);
         }
         check_memory(&params)?;
         Ok(params)
+    }
+}
+
+fn first_radius(radius: settings::FirstRadius) -> FirstRadius {
+    match radius {
+        settings::FirstRadius::Automatic => FirstRadius::Automatic,
+        settings::FirstRadius::Fixed(radius) => FirstRadius::Fixed(radius),
+    }
+}
+
+fn kernel(kernel: settings::Kernel) -> Kernel {
+    match kernel {
+        settings::Kernel::Epanechnikov => Kernel::Epanechnikov,
+        settings::Kernel::Constant => Kernel::Constant,
+    }
+}
+
+fn direct(direct: settings::Direct) -> Direct {
+    match direct {
+        settings::Direct::Sampled => Direct::Sampled,
+        settings::Direct::Photons => Direct::Photons,
     }
 }
 
@@ -138,9 +173,9 @@ fn default_size(camera: &Camera) -> [u32; 2] {
 }
 
 /// The camera of that name or number; the first if none is named.
-fn camera(scene: &Scene, wanted: Option<&String>) -> Result<Camera> {
+fn camera(scene: &Scene, wanted: Option<&str>) -> Result<Camera> {
     let Some(wanted) = wanted else { return Ok(scene.cameras[0].clone()) };
-    let by_name = scene.cameras.iter().find(|c| &c.name == wanted);
+    let by_name = scene.cameras.iter().find(|c| c.name == wanted);
     let by_number = || wanted.parse().ok().and_then(|i: usize| scene.cameras.get(i));
     by_name.or_else(by_number).cloned().with_context(|| {
         let list: Vec<_> = scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} {:?}", c.name)).collect();

@@ -41,7 +41,7 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode> {
         if let Err(error) = run.iterate(stages, i, began) {
             break Err(error);
         }
-        let spent = job.budget.spent(i, began.elapsed());
+        let spent = job.budget.spent(i, began.elapsed().as_secs_f64());
         progress.update(&run.status(spent));
         if stop.asked() {
             break Ok(End::Interrupted);
@@ -161,7 +161,7 @@ impl<'a> Run<'a> {
         }
         if save {
             if let Err(error) = self.save_pictures() {
-                progress.say(&format!("sunfleck: warning: {error:#}"));
+                progress.say(&format!("sunfleck: warning: {}", crate::chain(&error)));
             }
             self.saved = Instant::now();
         }
@@ -186,7 +186,7 @@ impl<'a> Run<'a> {
         }
         if let Some(error) = &failure {
             self.report.end = End::Failed;
-            self.report.error = Some(format!("{error:#}"));
+            self.report.error = Some(crate::chain(error));
         }
         if let Some(path) = &self.args.json
             && let Err(error) = self.report.write(path)
@@ -194,7 +194,7 @@ impl<'a> Run<'a> {
             failure = failure.or(Some(error));
         }
         if let Some(error) = failure {
-            bail!("{error:#} ({})", self.summary());
+            bail!("{} ({})", crate::chain(&error), self.summary());
         }
         self.say_result(progress);
         Ok(if self.report.end == End::Interrupted { ExitCode::from(crate::INTERRUPTED) } else { ExitCode::SUCCESS })

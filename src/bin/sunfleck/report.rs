@@ -159,7 +159,7 @@ impl Settings {
             max_photon_segments: params.max_photon_segments,
             max_segments: (params.max_segments != u32::MAX).then_some(params.max_segments),
             iterations: budget.iterations,
-            seconds: budget.time.map(|t| t.as_secs_f64()),
+            seconds: budget.seconds,
         }
     }
 }

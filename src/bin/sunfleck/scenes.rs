@@ -6,36 +6,68 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use sunfleck::output::atomic;
-use sunfleck::scene::Scene;
 use sunfleck::scene::export::{self, glb_bytes};
+use sunfleck::scene::load::{Loaded, load};
+use sunfleck::scene::settings::Settings;
 use sunfleck::scene::shipped::{NAMES, shipped};
 
 use crate::cli::{ExportArgs, Usage};
-use crate::shim::Settings;
 
-/// What SCENE stands for: a scene file or a shipped name, and the settings that come with it.
-pub fn resolve(scene: &str) -> Result<(PathBuf, Settings)> {
-    let path = Path::new(scene);
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
-        let settings = Settings::load(path).with_context(|| scene.to_owned())?;
-        let file = settings.scene.clone().with_context(|| format!("{scene}: scene: no scene is named"))?;
-        return Ok((file, settings));
-    }
-    if !is_shipped(path) && path.extension().is_none() && !path.exists() {
-        let close = NAMES.into_iter().find(|name| distance(name, scene) <= 2);
-        let hint = close.map_or(String::new(), |name| format!("did you mean {name}? "));
-        bail!("{scene}: neither a file nor a scene that comes with sunfleck ({hint}there are: {})", NAMES.join(", "));
-    }
-    Ok((path.to_owned(), Settings::default()))
+/// What SCENE stands for.
+pub struct Source {
+    /// As given.
+    name: String,
+    /// A scene file, or the name of a shipped scene.
+    pub file: PathBuf,
+    /// What the settings file says; nothing without one.
+    pub settings: Settings,
+    /// Where the settings file lies.
+    pub folder: PathBuf,
 }
 
-/// Reads a scene file, or makes a shipped scene; with what was not honoured.
-pub fn load(file: &Path) -> Result<(Scene, Vec<String>)> {
-    if let Some(scene) = is_shipped(file).then(|| shipped(&file.to_string_lossy())).flatten() {
-        return Ok((scene, vec![]));
+impl Source {
+    /// Reads the settings, if SCENE is a settings file; not yet the scene.
+    pub fn resolve(scene: &str) -> Result<Self> {
+        let path = Path::new(scene);
+        if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+            check_name(scene)?;
+            let name = scene.to_owned();
+            return Ok(Self { name, file: path.to_owned(), settings: Settings::default(), folder: PathBuf::new() });
+        }
+        let settings = Settings::load(path)?;
+        let named = settings.scene.as_ref().with_context(|| format!("{scene}: scene: is missing: it names a file"))?;
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        let beside = folder.join(named);
+        let file = if !beside.exists() && NAMES.contains(&named.as_str()) { named.into() } else { beside };
+        Ok(Self { name: scene.to_owned(), file, settings, folder })
     }
-    let loaded = sunfleck::scene::load::load(file)?;
-    Ok((loaded.scene, loaded.warnings))
+
+    /// Reads the scene as its file has it, or makes a shipped one; with what was not honoured.
+    pub fn scene(&self) -> Result<Loaded> {
+        if let Some(scene) = is_shipped(&self.file).then(|| shipped(&self.file.to_string_lossy())).flatten() {
+            return Ok(Loaded { scene, warnings: vec![] });
+        }
+        Ok(load(&self.file)?)
+    }
+
+    /// Changes a scene as the settings say.
+    pub fn apply(&self, loaded: &mut Loaded) -> Result<()> {
+        let warnings =
+            self.settings.apply_to_scene(&mut loaded.scene, &self.folder).with_context(|| self.name.clone())?;
+        loaded.warnings.extend(warnings);
+        Ok(())
+    }
+}
+
+/// Whether `scene` can be anything; if not, says what is near.
+fn check_name(scene: &str) -> Result<()> {
+    let path = Path::new(scene);
+    if path.extension().is_some() || path.exists() || NAMES.contains(&scene) {
+        return Ok(());
+    }
+    let close = NAMES.into_iter().find(|name| distance(name, scene) <= 2);
+    let hint = close.map_or(String::new(), |name| format!("did you mean {name}? "));
+    bail!("{scene}: neither a file nor a scene that comes with sunfleck ({hint}there are: {})", NAMES.join(", "));
 }
 
 /// A file of that name comes first.
@@ -83,9 +115,10 @@ pub fn export(args: &ExportArgs) -> Result<ExitCode> {
         bail!(Usage(format!("-o {}: an exported scene ends in .glb", path.display())));
     }
     atomic::check(path)?;
-    let (file, settings) = resolve(&args.scene)?;
-    let (mut scene, warnings) = load(&file)?;
-    settings.apply_to_scene(&mut scene)?;
+    let source = Source::resolve(&args.scene)?;
+    let mut loaded = source.scene()?;
+    source.apply(&mut loaded)?;
+    let Loaded { scene, warnings } = loaded;
     for warning in warnings {
         eprintln!("sunfleck: warning: {}", crate::one_line(&warning));
     }

@@ -6,6 +6,8 @@ use std::fs::{self, File};
 use std::io::{ErrorKind, Read};
 use std::path::{Component, Path, PathBuf};
 
+const OUTSIDE: &str = "lies outside the folder of the scene file";
+
 /// The scene file, for messages, and the folder that everything it names lies in.
 pub(super) struct Source {
     file: PathBuf,
@@ -83,14 +85,20 @@ impl Source {
         read_regular(&path, MAX_FILE_BYTES).map_err(|problem| self.external(place, name, problem))
     }
 
-    /// Whether there is nothing at `name` (rather than something that must not be read).
+    /// Whether `name` could be read but for nothing being there.
     pub(super) fn is_missing(&self, name: &str) -> bool {
-        let path = self.folder.join(name.replace('\\', "/"));
-        !name.contains('\0') && fs::symlink_metadata(path).is_err_and(|e| e.kind() == ErrorKind::NotFound)
+        let missing = |path| fs::symlink_metadata(path).is_err_and(|e| e.kind() == ErrorKind::NotFound);
+        self.path_inside(name).is_ok_and(missing)
     }
 
     fn resolve(&self, name: &str) -> Result<PathBuf, String> {
-        const OUTSIDE: &str = "lies outside the folder of the scene file";
+        let path = self.path_inside(name)?.canonicalize().map_err(|e| e.to_string())?;
+        // Links may lead anywhere.
+        if path.starts_with(&self.folder) { Ok(path) } else { Err(OUTSIDE.into()) }
+    }
+
+    /// Where `name` leads if nothing on the way is a link.
+    fn path_inside(&self, name: &str) -> Result<PathBuf, String> {
         if name.is_empty() || name.contains('\0') {
             return Err("is not a file name".into());
         }
@@ -108,12 +116,7 @@ impl Source {
                 return Err(OUTSIDE.into());
             }
         }
-        let path = self.folder.join(&name).canonicalize().map_err(|e| e.to_string())?;
-        // Links may lead anywhere.
-        if !path.starts_with(&self.folder) {
-            return Err(OUTSIDE.into());
-        }
-        Ok(path)
+        Ok(self.folder.join(name))
     }
 }
 
@@ -124,7 +127,7 @@ pub(super) fn check_regular(path: &Path) -> Result<(), String> {
 }
 
 /// The bytes of a regular file of at most `limit` bytes.
-pub(super) fn read_regular(path: &Path, limit: u64) -> Result<Vec<u8>, String> {
+pub(in crate::scene) fn read_regular(path: &Path, limit: u64) -> Result<Vec<u8>, String> {
     check_regular(path)?;
     let file = File::open(path).map_err(|e| e.to_string())?;
     let length = file.metadata().map_err(|e| e.to_string())?.len();

@@ -41,7 +41,7 @@ fn cofactors(m: DMat3) -> DMat3 {
 ///
 /// The indices must be in range and the attributes as long as the positions. The error is in words.
 pub(super) fn clean(mesh: &mut Mesh, place: &str, warnings: &mut Warnings) -> Result<(), String> {
-    let far = |p: &Vec3| !(p.abs().max_element() <= MAX_COORDINATE);
+    let far = |p: &Vec3| p.abs().max_element() > MAX_COORDINATE;
     if let Some(i) = mesh.positions.iter().position(|p| !p.is_finite()) {
         return Err(format!("vertex {i} of mesh {:?} is not finite", mesh.name));
     }

@@ -6,12 +6,13 @@
 //! decoders do the rest under limits.
 
 mod environment;
-mod files;
+pub(super) mod files;
 mod geometry;
 mod gltf;
 mod image;
 mod mtl;
 mod obj;
+mod packing;
 
 use super::Scene;
 pub use environment::load_environment;
@@ -40,7 +41,7 @@ const MAX_WARNINGS: usize = 100;
 /// A scene, and what in its file was not honoured.
 #[derive(Debug)]
 pub struct Loaded {
-    /// The scene; [`Scene::check`] holds, but it may have no camera and no light.
+    /// [`Scene::check`] holds, unless there is nothing to see in it; it may have no camera and no light.
     pub scene: Scene,
     /// For the user, each naming the place in the file.
     pub warnings: Vec<String>,

@@ -154,7 +154,7 @@ impl Loader<'_, '_> {
                 self.warnings.push(format!("{place}.attenuationDistance: 0 is not a distance; nothing is absorbed"));
                 Ok(Vec3::ZERO)
             }
-            Some(distance) if !(distance > 0.0) => {
+            Some(distance) if distance < 0.0 => {
                 Err(self.source.invalid(format!("{place}.attenuationDistance"), format!("{distance} is not positive")))
             }
             // 1e999 and the like: as good as the default, infinity.

@@ -34,12 +34,14 @@ const SUPPORTED_EXTENSIONS: &[&str] = &[
 
 /// Extensions without which the file can be shown, if not as meant: a warning, even where they are required.
 const IGNORED_EXTENSIONS: &[&str] = &[
+    "KHR_animation_pointer",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
     "KHR_materials_diffuse_transmission",
     "KHR_materials_dispersion",
     "KHR_materials_iridescence",
     "KHR_materials_sheen",
+    "KHR_xmp_json_ld",
 ];
 
 /// Reads a scene; `bytes` is the content of the file.

@@ -1,0 +1,128 @@
+//! A light and a camera for scenes that bring none.
+
+use super::{Camera, Environment, Scene};
+use glam::Vec3;
+
+/// Texels of the default sky's height; its width is twice that.
+const SKY_HEIGHT: u32 = 128;
+
+/// Gives a scene in which nothing shines a soft sky, and says so; a scene with any light is left alone.
+pub fn add_default_light(scene: &mut Scene) -> Option<String> {
+    if has_light(scene) {
+        return None;
+    }
+    scene.environment = Some(default_sky());
+    Some("nothing in the scene gives light: a soft sky is added".into())
+}
+
+/// Whether an emissive material is in use, or there is a light or an environment, however dim.
+pub fn has_light(scene: &Scene) -> bool {
+    let emits = |material: usize| scene.materials.get(material).is_some_and(|m| m.emission != Vec3::ZERO);
+    !scene.lights.is_empty()
+        || scene.environment.is_some()
+        || scene.meshes.iter().any(|mesh| !mesh.triangles.is_empty() && emits(mesh.material))
+        || scene.spheres.iter().any(|sphere| emits(sphere.material))
+}
+
+/// A gradient from a dim ground to a pale horizon to a bluish zenith, and one broad bright region high on the left of
+/// [`default_camera`], wide enough for soft shadows and bright enough for caustics.
+pub fn default_sky() -> Environment {
+    /// Radiance at the middle of the bright region.
+    const SUN: Vec3 = Vec3::new(24.0, 22.5, 20.0);
+    /// 1 − cosine at which the region has fallen to 1/e: about 16°.
+    const SUN_WIDTH: f32 = 0.04;
+    let (ground, horizon, zenith) = (Vec3::splat(0.18), Vec3::splat(0.75), Vec3::new(0.30, 0.38, 0.52));
+    let sun_direction = Vec3::new(-0.55, 0.75, 0.45).normalize();
+    let (width, height) = (2 * SKY_HEIGHT, SKY_HEIGHT);
+    let texel = |i: u32| {
+        let uv = glam::Vec2::new((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
+        let direction = Environment::direction_of(uv / glam::Vec2::new(width as f32, height as f32));
+        let sky = horizon.lerp(zenith, direction.y.max(0.0).sqrt());
+        // A horizon without an edge.
+        let base = ground.lerp(sky, smoothstep((direction.y + 0.1) / 0.2));
+        base + SUN * ((direction.dot(sun_direction) - 1.0) / SUN_WIDTH).exp()
+    };
+    let texels = (0..width * height).map(texel).collect();
+    Environment { width, height, texels, rotation: 0.0, strength: 1.0 }
+}
+
+fn smoothstep(t: f32) -> f32 {
+    let t = t.clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// A camera that has the whole scene in view, in pictures at least as wide as high: a little from the right, a little
+/// from above. Rooms made of one inward sphere do not count as long as there is something else.
+pub fn default_camera(scene: &Scene) -> Camera {
+    const YFOV: f32 = 40_f32.to_radians();
+    let (azimuth, elevation) = (30_f32.to_radians(), 20_f32.to_radians());
+    let (centre, radius) = bounding_sphere(scene, false).or_else(|| bounding_sphere(scene, true)).unwrap_or_default();
+    let radius = if radius > 0.0 { radius } else { 1.0 };
+    let (sin, cos) = azimuth.sin_cos();
+    let towards = Vec3::new(sin * elevation.cos(), elevation.sin(), cos * elevation.cos());
+    // The sphere touches the frustum's sides at this distance; a little air around it.
+    let distance = 1.05 * radius / (0.5 * YFOV).sin();
+    Camera::look_at("default", centre + towards * distance, centre, Vec3::Y, YFOV)
+}
+
+/// Centre of the bounding box of everything and the radius that reaches every point.
+fn bounding_sphere(scene: &Scene, with_inward: bool) -> Option<(Vec3, f32)> {
+    let spheres = || scene.spheres.iter().filter(|sphere| with_inward || !sphere.inward);
+    // Only vertices in use: files carry stray ones.
+    let vertices = || {
+        scene.meshes.iter().flat_map(|mesh| {
+            mesh.triangles.iter().flatten().filter_map(move |&i| mesh.positions.get(i as usize).copied())
+        })
+    };
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for (p, radius) in vertices().map(|p| (p, 0.0)).chain(spheres().map(|s| (s.centre, s.radius))) {
+        low = low.min(p - radius);
+        high = high.max(p + radius);
+    }
+    if !(low.is_finite() && high.is_finite()) {
+        return None;
+    }
+    let centre = 0.5 * (low + high);
+    let reach = vertices()
+        .map(|p| p.distance(centre))
+        .chain(spheres().map(|s| s.centre.distance(centre) + s.radius))
+        .fold(0.0, f32::max);
+    Some((centre, reach))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Material, Mesh, Projection, Sphere};
+
+    #[test]
+    fn the_camera_sees_every_vertex() {
+        let positions: Vec<Vec3> = (0..8)
+            .map(|i| Vec3::new((i & 1) as f32 * 5.0, (i >> 1 & 1) as f32, (i >> 2) as f32 * 3.0) + 10.0)
+            .collect();
+        let mesh = Mesh { positions, triangles: vec![[0, 1, 2], [3, 4, 5], [5, 6, 7]], ..Mesh::default() };
+        let dome = Sphere { centre: Vec3::ZERO, radius: 1000.0, inward: true, material: 0 };
+        let scene = Scene { meshes: vec![mesh], spheres: vec![dome], ..Scene::default() };
+        let camera = default_camera(&scene);
+        let Projection::Perspective { yfov } = camera.projection else { panic!("a perspective camera") };
+        let inverse = camera.world_from_camera.inverse();
+        for &p in &scene.meshes[0].positions {
+            let [x, y, z] = inverse.transform_point3(p).to_array();
+            assert!(z < 0.0 && x.abs().max(y.abs()) <= -z * (0.5 * yfov).tan(), "{p}");
+        }
+        assert!(camera.focus_distance < 20.0);
+    }
+
+    #[test]
+    fn the_sky_is_only_for_dark_scenes() {
+        let mesh = Mesh { positions: vec![Vec3::ZERO; 3], triangles: vec![[0, 1, 2]], ..Mesh::default() };
+        let materials = vec![Material::default(), Material::emitter("lamp", Vec3::ONE)];
+        let mut dark = Scene { meshes: vec![mesh], materials, ..Scene::default() };
+        let mut lit = dark.clone();
+        lit.meshes[0].material = 1;
+        assert!(add_default_light(&mut lit).is_none() && lit.environment.is_none());
+        assert!(add_default_light(&mut dark).is_some());
+        assert_eq!(dark.check(), Ok(()));
+        assert!(add_default_light(&mut dark).is_none());
+    }
+}

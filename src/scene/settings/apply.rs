@@ -1,0 +1,322 @@
+//! Checking of settings by themselves, and what they do to a scene.
+
+use super::{
+    CameraSettings, EnvironmentSettings, FirstRadius, LightKind, LightSettings, Settings, SettingsError, Size,
+    SphereSettings, Wrong,
+};
+use crate::scene::load::load_environment;
+use crate::scene::{
+    Camera, Environment, Material, Projection, PunctualKind, PunctualLight, Scene, Sphere, defaults::default_camera,
+};
+use glam::{Affine3A, Vec3};
+use std::path::Path;
+
+/// Width and height of a picture, at most.
+const MAX_SIDE: u32 = 16_384;
+
+/// Collects the first wrong value.
+struct Checks(Result<(), Wrong>);
+
+impl Checks {
+    fn require(&mut self, ok: bool, field: &str, problem: impl FnOnce() -> String) {
+        if self.0.is_ok() && !ok {
+            self.0 = Err((field.into(), problem()));
+        }
+    }
+
+    fn number(&mut self, field: &str, value: Option<f32>, range: impl Fn(f32) -> bool, expected: &str) {
+        if let Some(value) = value {
+            self.require(value.is_finite() && range(value), field, || format!("{value} is not {expected}"));
+        }
+    }
+
+    fn vector(&mut self, field: &str, value: Option<[f32; 3]>, range: impl Fn(Vec3) -> bool, expected: &str) {
+        if let Some(value) = value.map(Vec3::from) {
+            self.require(value.is_finite() && range(value), field, || format!("{value} is not {expected}"));
+        }
+    }
+
+    fn point(&mut self, field: &str, value: Option<[f32; 3]>) {
+        self.vector(field, value, |_| true, "finite");
+    }
+
+    fn direction(&mut self, field: &str, value: Option<[f32; 3]>) {
+        self.vector(field, value, |v| v.try_normalize().is_some(), "a direction");
+    }
+
+    fn color(&mut self, field: &str, value: Option<[f32; 3]>) {
+        self.vector(field, value, |v| v.min_element() >= 0.0, "a colour ≥ 0");
+    }
+
+    fn positive(&mut self, field: &str, value: Option<f32>) {
+        self.number(field, value, |v| v > 0.0, "a positive number");
+    }
+
+    fn not_negative(&mut self, field: &str, value: Option<f32>) {
+        self.number(field, value, |v| v >= 0.0, "a number ≥ 0");
+    }
+
+    fn unit(&mut self, field: &str, value: Option<f32>) {
+        self.number(field, value, |v| (0.0..=1.0).contains(&v), "between 0 and 1");
+    }
+}
+
+impl Settings {
+    /// Whether every value is within its range.
+    pub(super) fn check_values(&self) -> Result<(), Wrong> {
+        let mut checks = Checks(Ok(()));
+        let c = &mut checks;
+        if let Some(Size([width, height])) = self.size {
+            let ok = |side| (1..=MAX_SIDE).contains(&side);
+            c.require(ok(width) && ok(height), "size", || {
+                format!("{width} × {height} is not within {MAX_SIDE} × {MAX_SIDE}")
+            });
+        }
+        c.number("alpha", self.alpha, |v| v > 0.0 && v < 1.0, "between 0 and 1");
+        if let Some(FirstRadius::Fixed(radius)) = self.radius {
+            c.positive("radius", Some(radius));
+        }
+        c.positive("seconds", self.seconds.map(|s| s as f32));
+        c.number("exposure", self.exposure, |v| v.abs() <= 64.0, "between -64 and 64");
+        c.require(self.max_segments != Some(0), "max_segments", || "0 is not a length".into());
+        c.not_negative("light_scale", self.light_scale);
+        if let Some(camera) = &self.camera {
+            camera.check(c);
+        }
+        if let Some(environment) = &self.environment {
+            c.require(environment.file.is_some() || environment.color.is_some(), "environment", || {
+                "neither file nor color is given".into()
+            });
+            c.number("environment.rotation_degrees", environment.rotation_degrees, |_| true, "finite");
+            c.not_negative("environment.strength", environment.strength);
+            c.color("environment.color", environment.color);
+        }
+        for (i, sphere) in self.spheres.iter().enumerate() {
+            sphere.check(c, &format!("sphere[{i}]"));
+        }
+        for (i, light) in self.lights.iter().enumerate() {
+            light.check(c, &format!("light[{i}]"));
+        }
+        checks.0
+    }
+
+    /// Adds to and changes a scene as the settings say; the first camera is then the one to use.
+    ///
+    /// `folder` is where the settings file lies. Returns warnings.
+    pub fn apply_to_scene(&self, scene: &mut Scene, folder: &Path) -> Result<Vec<String>, SettingsError> {
+        let wrong = |(field, problem): Wrong| SettingsError::Field { field, problem };
+        self.check_values().map_err(wrong)?;
+        let mut warnings = Vec::new();
+        for (i, sphere) in self.spheres.iter().enumerate() {
+            sphere.apply(scene, i).map_err(wrong)?;
+        }
+        scene.lights.extend(self.lights.iter().map(LightSettings::light));
+        if let Some(environment) = &self.environment {
+            let (map, mut more) = environment.environment(folder)?;
+            scene.environment = Some(map);
+            warnings.append(&mut more);
+        }
+        if let Some(factor) = self.light_scale {
+            scale_lights(scene, factor);
+        }
+        if let Some(camera) = &self.camera {
+            camera.apply(scene).map_err(wrong)?;
+        }
+        Ok(warnings)
+    }
+}
+
+fn scale_lights(scene: &mut Scene, factor: f32) {
+    for material in &mut scene.materials {
+        material.emission *= factor;
+    }
+    for light in &mut scene.lights {
+        light.intensity *= factor;
+    }
+    if let Some(environment) = &mut scene.environment {
+        environment.strength *= factor;
+    }
+}
+
+impl CameraSettings {
+    fn check(&self, c: &mut Checks) {
+        c.point("camera.position", self.position);
+        c.point("camera.look_at", self.look_at);
+        c.direction("camera.forward", self.forward);
+        c.direction("camera.up", self.up);
+        c.require(self.look_at.is_none() || self.forward.is_none(), "camera.forward", || {
+            "look_at and forward exclude each other".into()
+        });
+        c.number("camera.yfov_degrees", self.yfov_degrees, |v| v > 0.0 && v < 180.0, "between 0 and 180 degrees");
+        c.not_negative("camera.aperture_radius", self.aperture_radius);
+        c.positive("camera.focus_distance", self.focus_distance);
+        if let (Some(position), Some(target)) = (self.position, self.look_at) {
+            c.require(position != target, "camera.look_at", || "is where the camera is".into());
+        }
+    }
+
+    /// Puts the camera first.
+    fn apply(&self, scene: &mut Scene) -> Result<(), Wrong> {
+        let chosen = match &self.name {
+            None => (!scene.cameras.is_empty()).then_some(0),
+            Some(name) => match scene.cameras.iter().position(|camera| camera.name == *name) {
+                Some(found) => Some(found),
+                None => {
+                    let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
+                    let problem = format!("there is no camera {name:?}; there are {names:?}");
+                    return Err(("camera.name".into(), problem));
+                }
+            },
+        };
+        let mut camera = match chosen {
+            Some(index) => scene.cameras.remove(index),
+            None => default_camera(scene),
+        };
+        if let Some(position) = self.position {
+            camera.world_from_camera.translation = position.into();
+        }
+        if self.look_at.is_some() || self.forward.is_some() || self.up.is_some() {
+            let position = Vec3::from(camera.world_from_camera.translation);
+            let forward = match (self.look_at, self.forward) {
+                (Some(target), _) => Vec3::from(target) - position,
+                (None, Some(forward)) => Vec3::from(forward),
+                (None, None) => -Vec3::from(camera.world_from_camera.matrix3.z_axis),
+            };
+            let forward = forward.try_normalize().ok_or(("camera.look_at".into(), "is where the camera is".into()))?;
+            let up = self.up.map_or(Vec3::Y, Vec3::from).normalize_or(Vec3::Y);
+            if let Some(target) = self.look_at {
+                camera.focus_distance = position.distance(target.into());
+            }
+            camera.world_from_camera = orient(position, forward, up);
+        }
+        if let Some(yfov) = self.yfov_degrees {
+            camera.projection = Projection::Perspective { yfov: yfov.to_radians() };
+        }
+        camera.aperture_radius = self.aperture_radius.unwrap_or(camera.aperture_radius);
+        camera.focus_distance = self.focus_distance.unwrap_or(camera.focus_distance);
+        scene.cameras.insert(0, camera);
+        Ok(())
+    }
+}
+
+fn orient(position: Vec3, forward: Vec3, up: Vec3) -> Affine3A {
+    // A camera may look straight up.
+    let up = if up.cross(forward).length() > 1e-4 { up } else { forward.any_orthonormal_vector() };
+    Camera::look_at("", position, position + forward, up, 1.0).world_from_camera
+}
+
+impl EnvironmentSettings {
+    fn environment(&self, folder: &Path) -> Result<(Environment, Vec<String>), SettingsError> {
+        let color = self.color.map_or(Vec3::ONE, Vec3::from);
+        let (mut environment, warnings) = match &self.file {
+            Some(file) => load_environment(&folder.join(file))?,
+            None => (Environment::uniform(Vec3::ONE), Vec::new()),
+        };
+        for texel in &mut environment.texels {
+            *texel *= color;
+        }
+        environment.rotation = self.rotation_degrees.unwrap_or(0.0).to_radians();
+        environment.strength = self.strength.unwrap_or(1.0);
+        Ok((environment, warnings))
+    }
+}
+
+impl SphereSettings {
+    fn check(&self, c: &mut Checks, place: &str) {
+        c.point(&format!("{place}.centre"), Some(self.centre));
+        c.positive(&format!("{place}.radius"), Some(self.radius));
+        let own = self.base_color.is_some()
+            || self.glass.is_some()
+            || self.ior.is_some()
+            || self.metallic.is_some()
+            || self.roughness.is_some()
+            || self.absorption.is_some()
+            || self.emission.is_some();
+        c.require(self.material.is_none() || !own, &format!("{place}.material"), || {
+            "a sphere has a named material or one of its own, not both".into()
+        });
+        let within = |v: Vec3| v.min_element() >= 0.0 && v.max_element() <= 1.0;
+        c.vector(&format!("{place}.base_color"), self.base_color, within, "between 0 and 1");
+        c.positive(&format!("{place}.ior"), self.ior);
+        c.unit(&format!("{place}.metallic"), self.metallic);
+        c.unit(&format!("{place}.roughness"), self.roughness);
+        c.color(&format!("{place}.absorption"), self.absorption);
+        c.color(&format!("{place}.emission"), self.emission);
+    }
+
+    fn apply(&self, scene: &mut Scene, index: usize) -> Result<(), Wrong> {
+        let material = match &self.material {
+            Some(name) => scene.materials.iter().position(|material| material.name == *name).ok_or_else(|| {
+                let names: Vec<&str> = scene.materials.iter().map(|m| m.name.as_str()).take(20).collect();
+                (format!("sphere[{index}].material"), format!("there is no material {name:?}; there are {names:?}"))
+            })?,
+            None => {
+                scene.materials.push(self.own_material(index));
+                scene.materials.len() - 1
+            }
+        };
+        let (centre, radius, inward) = (self.centre.into(), self.radius, self.inward);
+        scene.spheres.push(Sphere { centre, radius, inward, material });
+        Ok(())
+    }
+
+    fn own_material(&self, index: usize) -> Material {
+        let name = format!("sphere {index}");
+        let metallic = self.metallic.unwrap_or(0.0);
+        let emission = self.emission.map_or(Vec3::ZERO, Vec3::from);
+        let grey = if emission == Vec3::ZERO { Vec3::splat(0.5) } else { Vec3::ZERO };
+        let mut material = match self.glass {
+            Some(true) => Material::glass(&name, self.ior.unwrap_or(1.5)),
+            _ => Material {
+                roughness: if metallic > 0.0 { 0.0 } else { 1.0 },
+                specular: if self.ior.is_some() { 1.0 } else { 0.0 },
+                ior: self.ior.unwrap_or(1.5),
+                ..Material::diffuse(&name, grey)
+            },
+        };
+        material.base_color = self.base_color.map_or(material.base_color, Vec3::from);
+        material.metallic = metallic;
+        material.roughness = self.roughness.unwrap_or(material.roughness);
+        material.absorption = self.absorption.map_or(Vec3::ZERO, Vec3::from);
+        material.emission = emission;
+        // A lamp with two bright sides would light its own inside.
+        material.double_sided = emission == Vec3::ZERO;
+        material
+    }
+}
+
+impl LightSettings {
+    fn check(&self, c: &mut Checks, place: &str) {
+        let kind = self.kind;
+        c.require(kind == LightKind::Directional || self.position.is_some(), place, || "position is missing".into());
+        c.require(kind == LightKind::Point || self.direction.is_some(), place, || "direction is missing".into());
+        c.point(&format!("{place}.position"), self.position);
+        c.direction(&format!("{place}.direction"), self.direction);
+        c.not_negative(&format!("{place}.intensity"), Some(self.intensity));
+        c.color(&format!("{place}.color"), self.color);
+        let (inner, outer) = self.cone();
+        c.require(
+            kind != LightKind::Spot || (0.0 <= inner && inner < outer && outer <= 90.0),
+            &format!("{place}.outer_degrees"),
+            || format!("{inner} and {outer} degrees are not 0 ≤ inner < outer ≤ 90"),
+        );
+    }
+
+    fn cone(&self) -> (f32, f32) {
+        (self.inner_degrees.unwrap_or(0.0), self.outer_degrees.unwrap_or(45.0))
+    }
+
+    fn light(&self) -> PunctualLight {
+        let (inner, outer) = self.cone();
+        PunctualLight {
+            position: self.position.map_or(Vec3::ZERO, Vec3::from),
+            direction: self.direction.map_or(Vec3::NEG_Y, Vec3::from).normalize_or(Vec3::NEG_Y),
+            intensity: self.color.map_or(Vec3::ONE, Vec3::from) * self.intensity,
+            kind: match self.kind {
+                LightKind::Point => PunctualKind::Point,
+                LightKind::Spot => PunctualKind::Spot { inner: inner.to_radians(), outer: outer.to_radians() },
+                LightKind::Directional => PunctualKind::Directional,
+            },
+        }
+    }
+}

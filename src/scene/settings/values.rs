@@ -1,0 +1,212 @@
+//! Values of settings that may be written in several ways.
+
+use serde::de::{self, Deserializer, Visitor};
+use serde::{Deserialize, Serialize, Serializer};
+use std::fmt;
+
+/// A positive count, written `500000`, `"500k"` or `"1.5M"`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Count(pub u32);
+
+/// A picture's width and height, pixels, written `[1280, 720]` or `"1280x720"`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size(pub [u32; 2]);
+
+/// The first radius, written in metres or `"automatic"`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FirstRadius {
+    /// Chosen by the renderer, pixel by pixel.
+    Automatic,
+    /// Metres.
+    Fixed(f32),
+}
+
+/// Density estimation kernel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kernel {
+    /// Falls to nothing at the radius.
+    Epanechnikov,
+    /// The same everywhere.
+    Constant,
+}
+
+/// Who brings light straight from a lamp.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Direct {
+    /// Lights are sampled.
+    Sampled,
+    /// Photons.
+    Photons,
+}
+
+/// The kinds of lights without extent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LightKind {
+    /// Alike in all directions.
+    Point,
+    /// A cone.
+    Spot,
+    /// From infinitely far away.
+    Directional,
+}
+
+/// A positive count with an optional unit k (10³), M (10⁶) or G (10⁹): `500k`, `1.5M`, `2_000`.
+pub fn parse_count(text: &str) -> Result<u32, String> {
+    let expected = || format!("{text:?} is not a count such as 500000, 500k or 1.5M");
+    let trimmed = text.trim();
+    let (number, unit) = match trimmed.chars().last() {
+        Some('k' | 'K') => (&trimmed[..trimmed.len() - 1], 1e3),
+        Some('m' | 'M') => (&trimmed[..trimmed.len() - 1], 1e6),
+        Some('g' | 'G') => (&trimmed[..trimmed.len() - 1], 1e9),
+        _ => (trimmed, 1.0),
+    };
+    let number = number.trim_end().replace('_', "");
+    // `parse` would also take "inf" and "1e3".
+    if number.is_empty() || !number.chars().all(|c| c.is_ascii_digit() || c == '.') {
+        return Err(expected());
+    }
+    let value = number.parse::<f64>().map_err(|_| expected())? * unit;
+    let rounded = value.round();
+    if (value - rounded).abs() > 1e-6 * value {
+        return Err(format!("{text:?} is not a whole number"));
+    }
+    match rounded {
+        1.0..=4_294_967_295.0 => Ok(rounded as u32),
+        _ => Err(format!("{text:?} is not between 1 and {}", u32::MAX)),
+    }
+}
+
+fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let side = |text: &str| text.trim().parse::<u32>().ok();
+    match text.split_once(['x', 'X', '×']) {
+        Some((width, height)) => side(width).zip(side(height)).map(<[u32; 2]>::from),
+        None => None,
+    }
+    .ok_or_else(|| format!("{text:?} is not a size such as 1280x720"))
+}
+
+impl Serialize for Count {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_u32(self.0)
+    }
+}
+
+impl Serialize for Size {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.0.serialize(serializer)
+    }
+}
+
+impl Serialize for FirstRadius {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Automatic => serializer.serialize_str("automatic"),
+            Self::Fixed(radius) => serializer.serialize_f32(*radius),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Count {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct CountVisitor;
+        impl Visitor<'_> for CountVisitor {
+            type Value = Count;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                write!(f, "a count such as 500000, \"500k\" or \"1.5M\"")
+            }
+
+            fn visit_i64<E: de::Error>(self, value: i64) -> Result<Count, E> {
+                match u32::try_from(value) {
+                    Ok(value) if value > 0 => Ok(Count(value)),
+                    _ => Err(E::custom(format!("{value} is not between 1 and {}", u32::MAX))),
+                }
+            }
+
+            fn visit_u64<E: de::Error>(self, value: u64) -> Result<Count, E> {
+                self.visit_i64(i64::try_from(value).unwrap_or(i64::MAX))
+            }
+
+            fn visit_str<E: de::Error>(self, value: &str) -> Result<Count, E> {
+                parse_count(value).map(Count).map_err(E::custom)
+            }
+        }
+        deserializer.deserialize_any(CountVisitor)
+    }
+}
+
+impl<'de> Deserialize<'de> for Size {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct SizeVisitor;
+        impl<'de> Visitor<'de> for SizeVisitor {
+            type Value = Size;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                write!(f, "a size such as [1280, 720] or \"1280x720\"")
+            }
+
+            fn visit_seq<A: de::SeqAccess<'de>>(self, seq: A) -> Result<Size, A::Error> {
+                <[u32; 2]>::deserialize(de::value::SeqAccessDeserializer::new(seq)).map(Size)
+            }
+
+            fn visit_str<E: de::Error>(self, value: &str) -> Result<Size, E> {
+                parse_size(value).map(Size).map_err(E::custom)
+            }
+        }
+        deserializer.deserialize_any(SizeVisitor)
+    }
+}
+
+impl<'de> Deserialize<'de> for FirstRadius {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct RadiusVisitor;
+        impl Visitor<'_> for RadiusVisitor {
+            type Value = FirstRadius;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                write!(f, "a radius in metres or \"automatic\"")
+            }
+
+            fn visit_f64<E: de::Error>(self, value: f64) -> Result<FirstRadius, E> {
+                Ok(FirstRadius::Fixed(value as f32))
+            }
+
+            fn visit_i64<E: de::Error>(self, value: i64) -> Result<FirstRadius, E> {
+                Ok(FirstRadius::Fixed(value as f32))
+            }
+
+            fn visit_str<E: de::Error>(self, value: &str) -> Result<FirstRadius, E> {
+                match value {
+                    "automatic" => Ok(FirstRadius::Automatic),
+                    _ => Err(E::invalid_value(de::Unexpected::Str(value), &self)),
+                }
+            }
+        }
+        deserializer.deserialize_any(RadiusVisitor)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_have_units() {
+        for (text, count) in [
+            ("500k", 500_000),
+            ("1.5M", 1_500_000),
+            ("2M", 2_000_000),
+            ("7", 7),
+            ("2_000", 2000),
+            ("4G", 4_000_000_000),
+        ] {
+            assert_eq!(parse_count(text), Ok(count), "{text}");
+        }
+        for text in ["", "k", "0", "-5", "1.5", "5G", "inf", "nan", "1e3", "5kk", "five", "k5", "½", "1.2.3"] {
+            assert!(parse_count(text).is_err(), "{text}");
+        }
+    }
+}
