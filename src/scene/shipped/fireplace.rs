@@ -29,7 +29,7 @@ pub(super) fn scene() -> Scene {
     fender(&mut b);
     seats(&mut b);
     walls(&mut b);
-    b.camera("sofa", Vec3::new(1.95, 1.42, 2.35), Vec3::new(-0.35, 0.72, -2.6), 42.0, 16.0 / 9.0);
+    b.camera("room", Vec3::new(1.95, 1.42, 2.35), Vec3::new(-0.35, 0.72, -2.6), 42.0, 16.0 / 9.0);
     b.scene
 }
 

@@ -131,7 +131,7 @@ pub fn curtain(size: Vec2, folds: usize, seed: u32) -> Shape {
         let drift = super::pattern::noise(Vec2::new(u * 6.0 + 10.0, 0.5), [64, 1], seed) - 0.5;
         let phase = std::f32::consts::TAU * folds as f32 * u + 3.0 * drift;
         let gather = 0.035 + 0.020 * (1.0 - v);
-        Vec3::new((u - 0.5) * size.x + 0.3 * gather * (2.0 * phase).sin(), v * size.y, gather * phase.sin())
+        Vec3::new((u - 0.5) * size.x + 0.08 * gather * (2.0 * phase).sin(), v * size.y, gather * phase.sin())
     };
     Shape::sheet(24 * folds, 12, |u, v| (surface(u, v), super::curved::normal_of(surface, u, v)))
 }

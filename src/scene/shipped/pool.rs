@@ -83,7 +83,7 @@ pub(super) fn scene() -> Scene {
         kind: PunctualKind::Directional,
     });
     b.scene.environment = Some(sky());
-    b.camera("terrace", Vec3::new(2.55, 2.85, 4.05), Vec3::new(-0.30, -0.62, -0.42), 40.0, 16.0 / 9.0);
+    b.camera("garden", Vec3::new(2.55, 2.85, 4.05), Vec3::new(-0.30, -0.62, -0.42), 40.0, 16.0 / 9.0);
     b.scene
 }
 
