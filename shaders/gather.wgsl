@@ -1,6 +1,7 @@
 // Density estimate at each eye vertex: the photons within its radius, found in the implicit tree.
 #import common
 #import oct
+#import bsdf
 
 @group(0) @binding(0) var<storage, read> eye_vertices: array<EyeVertex>;
 @group(0) @binding(1) var<storage, read> first_radii: array<f32>;
@@ -8,7 +9,9 @@
 @group(0) @binding(3) var<storage, read> boxes: array<PointBox>;
 @group(0) @binding(4) var<storage, read_write> radiance: array<vec4<f32>>;
 
-const PI: f32 = 3.14159265;
+// As in src/cpu/gather.rs.
+const MIN_NORMAL_COSINE: f32 = 0.9;
+const MAX_PLANE_OFFSET: f32 = 0.1;
 
 // (first box, number of boxes) of a level.
 fn level_of(level: u32) -> vec2<u32> {
@@ -22,17 +25,18 @@ fn squared_distance_to_box(point: vec3<f32>, k: u32) -> f32 {
 }
 
 // Reads eye_vertices, first_radii, photons and boxes, writes radiance; one thread per pixel of the chunk.
-// values: pixels in the chunk, photons, levels of the tree.
+// values: rows in the chunk, photons, levels of the tree.
 @compute @workgroup_size(64)
 fn gather(
     @builtin(workgroup_id) workgroup: vec3<u32>,
     @builtin(num_workgroups) workgroups: vec3<u32>,
     @builtin(local_invocation_index) local: u32,
 ) {
-    let pixel = thread_index(workgroup, workgroups, local, 64u);
-    if pixel >= arguments.values.x {
+    let xy = tile_pixel(workgroup, workgroups, local, frame.width);
+    if xy.x >= frame.width || xy.y >= arguments.values.x {
         return;
     }
+    let pixel = xy.y * frame.width + xy.x;
     let n_photons = arguments.values.y;
     let n_levels = arguments.values.z;
     let vertex = eye_vertices[pixel];
@@ -45,15 +49,18 @@ fn gather(
     let normal = oct_decode(vertex.normal);
     let shading_normal = oct_decode(vertex.shading_normal);
     let glossy = (vertex.flags & EYE_GLOSSY) != 0u;
-    let two_sided = vertex.transmission > 0.0;
+    // Light is gathered on both sides where some of it comes through.
+    let both_sides = glossy && vertex.transmission > 0.0;
+    let bsdf = bsdf_of_vertex(vertex);
+    let outgoing = oct_decode(vertex.outgoing);
     let eye_segments = (vertex.flags >> 8u) & 0xffu;
     let constant_kernel = (frame.flags & FRAME_CONSTANT_KERNEL) != 0u;
     let radius = first_radii[pixel] * frame.radius_scale;
     let radius2 = radius * radius;
-    let off_plane = 0.1 * radius;
+    let inverse_radius2 = 1.0 / radius2;
 
-    var diffuse = vec3(0.0);
-    var other = vec3(0.0);
+    var diffuse_sum = vec3(0.0);
+    var glossy_sum = vec3(0.0);
     let top = n_levels - 1u;
     var level = top;
     var k = 0u;
@@ -75,25 +82,27 @@ fn gather(
                 if d2 > radius2 {
                     continue;
                 }
-                if abs(dot(delta, normal)) > off_plane {
+                if abs(dot(delta, normal)) > MAX_PLANE_OFFSET * radius {
                     continue;
                 }
                 let packed = photons[i].normal_and_segments;
+                let photon_normal = oct_decode24_unscaled(packed);
+                let facing = dot(photon_normal, normal);
+                if facing * facing < MIN_NORMAL_COSINE * MIN_NORMAL_COSINE * dot(photon_normal, photon_normal)
+                    || (facing < 0.0 && !both_sides) {
+                    continue;
+                }
                 if eye_segments + (packed >> 24u) > frame.max_segments {
                     continue;
                 }
-                let cosine = dot(normal, oct_decode24(packed));
-                if select(cosine, abs(cosine), two_sided) < 0.9 {
-                    continue;
-                }
-                let direction = oct_decode(photons[i].direction);
-                let weight = select(2.0 * (1.0 - d2 / radius2), 1.0, constant_kernel);
-                let flux = weight * photons[i].power;
-                if dot(direction, shading_normal) > 0.0 {
-                    diffuse += flux;
+                let weight = select(2.0 * (1.0 - d2 * inverse_radius2), 1.0, constant_kernel);
+                let power = weight * photons[i].power;
+                let incoming = oct_decode_unscaled(photons[i].direction);
+                if dot(incoming, shading_normal) > 0.0 {
+                    diffuse_sum += power;
                 }
                 if glossy {
-                    other += flux * evaluate_glossy(vertex, shading_normal, direction);
+                    glossy_sum += power * bsdf_evaluate(bsdf, outgoing, normalize(incoming), LOBE_SPECULAR, RADIANCE);
                 }
             }
         }
@@ -109,11 +118,7 @@ fn gather(
             span = level_of(level);
         }
     }
-    let estimate = (vertex.diffuse * diffuse + other) / (PI * radius2 * f32(frame.n_paths));
-    radiance[pixel] = vec4(vertex.radiance + vertex.throughput * estimate, 0.0);
-}
-
-// All lobes but the diffuse one, 1/sr.
-fn evaluate_glossy(vertex: EyeVertex, shading_normal: vec3<f32>, direction: vec3<f32>) -> vec3<f32> {
-    return vec3(0.0);
+    let sum = vertex.diffuse * diffuse_sum + glossy_sum;
+    let scale = inverse_radius2 / (PI * f32(frame.n_paths));
+    radiance[pixel] = vec4(vertex.radiance + vertex.throughput * sum * scale, 0.0);
 }

@@ -1,4 +1,4 @@
-// 63-bit Morton code of each photon in the cube over the photons' bounds, 21 bits an axis.
+// 63-bit Morton code of each photon in the photons' bounds, 21 bits an axis.
 #import common
 
 @group(0) @binding(0) var<storage, read> photons: array<Photon>;
@@ -41,14 +41,12 @@ fn morton_keys(
     if i >= arguments.values.x {
         return;
     }
-    let size = bounds.max - bounds.min;
-    let extent = max(size.x, max(size.y, size.z));
-    var cell = vec3(0u);
-    // Below this the quotient would overflow; everything is then one cell.
-    if extent > 1e-30 {
-        let scaled = (photons[i].position - bounds.min) * (CELLS / extent);
-        cell = vec3<u32>(clamp(scaled, vec3(0.0), vec3(CELLS - 1.0)));
-    }
+    let extent = bounds.max - bounds.min;
+    // Below this the quotient would overflow; everything is then in one cell.
+    let flat = extent < vec3(1e-30);
+    let scale = select(vec3(CELLS) / extent, vec3(0.0), flat);
+    let scaled = (photons[i].position - bounds.min) * scale;
+    let cell = vec3<u32>(clamp(scaled, vec3(0.0), vec3(CELLS - 1.0)));
     keys[i] = morton(cell);
     order[i] = i;
 }

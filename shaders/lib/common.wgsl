@@ -15,3 +15,14 @@ struct Arguments {
 fn thread_index(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32, threads: u32) -> u32 {
     return (workgroup.y * workgroups.x + workgroup.x) * threads + local;
 }
+
+// Pixel of a thread: a workgroup takes 8×8 of them, 4×2 to each eight threads, so that neighbours in the machine are
+// neighbours in the picture.
+fn tile_pixel(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32, width: u32) -> vec2<u32> {
+    let tile = workgroup.y * workgroups.x + workgroup.x;
+    let across = (width + 7u) / 8u;
+    let corner = vec2(tile % across, tile / across) * 8u;
+    let x = (local & 3u) | ((local >> 1u) & 4u);
+    let y = ((local >> 2u) & 1u) | ((local >> 3u) & 6u);
+    return corner + vec2(x, y);
+}

@@ -5,19 +5,24 @@ fn copysign(a: f32, b: f32) -> f32 {
     return bitcast<f32>((bitcast<u32>(a) & 0x7fffffffu) | (bitcast<u32>(b) & 0x80000000u));
 }
 
-fn unit_from_square(p: vec2<f32>) -> vec3<f32> {
+fn vector_from_square(p: vec2<f32>) -> vec3<f32> {
     let z = 1.0 - abs(p.x) - abs(p.y);
     let t = max(-z, 0.0);
-    return normalize(vec3(p.x - copysign(t, p.x), p.y - copysign(t, p.y), z));
+    return vec3(p.x - copysign(t, p.x), p.y - copysign(t, p.y), z);
 }
 
 fn oct_decode(bits: u32) -> vec3<f32> {
-    return unit_from_square(vec2(f32(bits & 0xffffu), f32(bits >> 16u)) * (2.0 / 65535.0) - 1.0);
+    return normalize(oct_decode_unscaled(bits));
 }
 
-// The low 24 bits, 12 a component.
-fn oct_decode24(bits: u32) -> vec3<f32> {
-    return unit_from_square(vec2(f32(bits & 0xfffu), f32((bits >> 12u) & 0xfffu)) * (2.0 / 4095.0) - 1.0);
+// Between 1/√3 and 1 long.
+fn oct_decode_unscaled(bits: u32) -> vec3<f32> {
+    return vector_from_square(vec2(f32(bits & 0xffffu), f32(bits >> 16u)) * (2.0 / 65535.0) - 1.0);
+}
+
+// The low 24 bits, 12 a component; between 1/√3 and 1 long.
+fn oct_decode24_unscaled(bits: u32) -> vec3<f32> {
+    return vector_from_square(vec2(f32(bits & 0xfffu), f32((bits >> 12u) & 0xfffu)) * (2.0 / 4095.0) - 1.0);
 }
 
 fn square_from_unit(unit: vec3<f32>) -> vec2<f32> {
@@ -29,7 +34,7 @@ fn square_from_unit(unit: vec3<f32>) -> vec2<f32> {
 }
 
 fn oct_quantise(v: f32, steps: f32) -> u32 {
-    return u32(clamp(floor((v * 0.5 + 0.5) * steps + 0.5), 0.0, steps));
+    return u32(clamp((v * 0.5 + 0.5) * steps + 0.5, 0.0, steps));
 }
 
 fn oct_encode(v: vec3<f32>) -> u32 {

@@ -7,8 +7,9 @@ use std::sync::{Arc, Mutex};
 use bytemuck::{Pod, Zeroable};
 
 use super::context::Context;
+use super::scene::{SceneBuffers, Tables};
 use super::shaders;
-use crate::layout::Frame;
+use crate::layout::{Camera, Frame, SceneInfo};
 use crate::ppm::Error;
 
 /// How a kernel uses a storage buffer.
@@ -25,6 +26,8 @@ pub(super) struct Kernel {
     name: &'static str,
     pipeline: wgpu::ComputePipeline,
     bindings: wgpu::BindGroupLayout,
+    /// Whether it reads the scene.
+    scene: bool,
 }
 
 /// Twin of `Arguments` in `shaders/lib/common.wgsl`.
@@ -46,16 +49,17 @@ const STRIDE: u64 = 256;
 /// Dispatches in one submission.
 const CAPACITY: u64 = 256;
 
-/// What all kernels share: the second bind group.
+/// What all kernels share: the second bind group, and the third for those that read the scene.
 pub(super) struct Shared {
     layout: wgpu::BindGroupLayout,
     group: wgpu::BindGroup,
     arguments: wgpu::Buffer,
     frame: wgpu::Buffer,
+    scene: SceneBuffers,
 }
 
 impl Shared {
-    pub(super) fn new(context: &Context) -> Self {
+    pub(super) fn new(context: &Context, scene: SceneBuffers) -> Self {
         let device = &context.device;
         let entry = |binding, dynamic, bytes: usize| wgpu::BindGroupLayoutEntry {
             binding,
@@ -69,7 +73,13 @@ impl Shared {
         };
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("shared"),
-            entries: &[entry(0, true, size_of::<Arguments>()), entry(1, false, size_of::<Frame>())],
+            entries: &[
+                entry(0, true, size_of::<Arguments>()),
+                entry(1, false, size_of::<Frame>()),
+                entry(2, false, size_of::<Camera>()),
+                entry(3, false, size_of::<SceneInfo>()),
+                entry(4, false, size_of::<Tables>()),
+            ],
         });
         let uniform = |label, size| {
             device.create_buffer(&wgpu::BufferDescriptor {
@@ -88,9 +98,12 @@ impl Shared {
             entries: &[
                 wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::Buffer(window) },
                 wgpu::BindGroupEntry { binding: 1, resource: frame.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 2, resource: scene.camera.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 3, resource: scene.info.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 4, resource: scene.tables.as_entire_binding() },
             ],
         });
-        Self { layout, group, arguments, frame }
+        Self { layout, group, arguments, frame, scene }
     }
 
     /// Constants of the dispatches submitted from now on.
@@ -114,7 +127,7 @@ impl<'a> Modules<'a> {
     }
 
     /// The entry point `name` of `module`, whose storage buffers are used as `accesses` says, in the order of their
-    /// bindings.
+    /// bindings; the scene's come besides if the module imports it.
     pub(super) fn kernel(&self, module: &str, name: &'static str, accesses: &[Access]) -> Result<Arc<Kernel>, Error> {
         let mut known = self.context.kernels.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some(kernel) = known.get(name) {
@@ -127,10 +140,12 @@ impl<'a> Modules<'a> {
 
     fn build(&self, module: &str, name: &'static str, accesses: &[Access]) -> Result<Kernel, Error> {
         let device = &self.context.device;
+        let source = shaders::source(module);
+        let scene = source.contains("@group(2)");
         let build = || {
             let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(module),
-                source: wgpu::ShaderSource::Wgsl(shaders::source(module).into()),
+                source: wgpu::ShaderSource::Wgsl(source.into()),
             });
             let entries: Vec<_> = accesses
                 .iter()
@@ -148,9 +163,13 @@ impl<'a> Modules<'a> {
                 .collect();
             let bindings = device
                 .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(name), entries: &entries });
+            let mut groups = vec![Some(&bindings), Some(&self.shared.layout)];
+            if scene {
+                groups.push(Some(&self.shared.scene.layout));
+            }
             let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some(name),
-                bind_group_layouts: &[Some(&bindings), Some(&self.shared.layout)],
+                bind_group_layouts: &groups,
                 immediate_size: 0,
             });
             let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
@@ -165,7 +184,7 @@ impl<'a> Modules<'a> {
                 },
                 cache: None,
             });
-            Kernel { name, pipeline, bindings }
+            Kernel { name, pipeline, bindings, scene }
         };
         self.context.scoped(build).map_err(|error| self.context.error(format!("{module}.wgsl: {error}")))
     }
@@ -222,6 +241,9 @@ impl<'a> Batch<'a> {
         pass.set_pipeline(&kernel.pipeline);
         pass.set_bind_group(0, &group, &[]);
         pass.set_bind_group(1, &self.shared.group, &[offset as u32]);
+        if kernel.scene {
+            pass.set_bind_group(2, &self.shared.scene.group, &[]);
+        }
         // One dimension holds 65535; the kernels put the two together again.
         let most = self.context.limits.max_compute_workgroups_per_dimension.min(65535);
         let rows = groups.div_ceil(most);

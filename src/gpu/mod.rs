@@ -4,6 +4,8 @@ mod buffers;
 mod context;
 mod index;
 mod kernels;
+mod photons;
+mod scene;
 pub mod shaders;
 mod stages;
 mod timer;

@@ -5,10 +5,27 @@ const LIBRARY: &[(&str, &str)] = &[
     ("layout", include_str!("../../shaders/layout.wgsl")),
     ("common", include_str!("../../shaders/lib/common.wgsl")),
     ("oct", include_str!("../../shaders/lib/oct.wgsl")),
+    ("rng", include_str!("../../shaders/lib/rng.wgsl")),
+    ("basis", include_str!("../../shaders/lib/basis.wgsl")),
+    ("warp", include_str!("../../shaders/lib/warp.wgsl")),
+    ("ggx", include_str!("../../shaders/lib/ggx.wgsl")),
+    ("scene", include_str!("../../shaders/lib/scene.wgsl")),
+    ("albedo", include_str!("../../shaders/lib/albedo.wgsl")),
+    ("texture", include_str!("../../shaders/lib/texture.wgsl")),
+    ("trace", include_str!("../../shaders/lib/trace.wgsl")),
+    ("surface", include_str!("../../shaders/lib/surface.wgsl")),
+    ("bsdf", include_str!("../../shaders/lib/bsdf.wgsl")),
+    ("bsdf_surface", include_str!("../../shaders/lib/bsdf_surface.wgsl")),
+    ("light", include_str!("../../shaders/lib/light.wgsl")),
+    ("camera", include_str!("../../shaders/lib/camera.wgsl")),
+    ("photon_paths", include_str!("../../shaders/lib/photon_paths.wgsl")),
 ];
 
 /// Every module with entry points: name and text before composition.
 const MODULES: &[(&str, &str)] = &[
+    ("eye", include_str!("../../shaders/eye.wgsl")),
+    ("photons", include_str!("../../shaders/photons.wgsl")),
+    ("compact", include_str!("../../shaders/compact.wgsl")),
     ("bounds", include_str!("../../shaders/bounds.wgsl")),
     ("morton", include_str!("../../shaders/morton.wgsl")),
     ("sort", include_str!("../../shaders/sort.wgsl")),

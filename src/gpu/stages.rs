@@ -6,16 +6,21 @@ use super::buffers::{Array, Readback};
 use super::context::Context;
 use super::index::Index;
 use super::kernels::{Access, Batch, Kernel, Modules, Shared};
+use super::photons::PhotonPaths;
+use super::scene::SceneBuffers;
 use super::timer::{Stage, Timer};
 use crate::layout::{Camera, EyeVertex, Frame, Photon, PointBox};
 use crate::ppm::{Error, Film, StageTimes, Stages};
+use crate::scene::PackedScene;
 
 /// Threads a workgroup.
 const THREADS: u32 = 64;
-/// Pixels are cut at multiples of this, so that the address of any part of a per-pixel array is aligned.
-const PIXEL_STEP: u32 = 4096;
-/// Pixels of the first gather dispatch, before anything is known about the device's speed.
+/// The film is cut at multiples of this many rows, so that the address of any part of a per-pixel array is aligned.
+const ROW_STEP: u32 = 64;
+/// Pixels of the first dispatches, before anything is known about the device's speed.
 const FIRST_CHUNK: u32 = 65536;
+/// Pixels of the largest dispatches: 112 bytes each have to fit a binding.
+const MOST_PIXELS: u32 = 1 << 19;
 /// Seconds a dispatch may take, well below what watchdogs allow.
 const DISPATCH_SECONDS: f64 = 0.1;
 
@@ -24,6 +29,8 @@ pub struct GpuStages {
     context: Arc<Context>,
     shared: Shared,
     camera: Camera,
+    trace_eye: Arc<Kernel>,
+    paths: PhotonPaths,
     index: Index,
     gather: Arc<Kernel>,
     accumulate: Arc<Kernel>,
@@ -40,16 +47,20 @@ pub struct GpuStages {
     n_photons: u32,
     film_size: [u32; 2],
     n_iterations: u32,
+    /// Pixels a dispatch of eye paths handles.
+    eye_chunk: u32,
     /// Pixels a gather dispatch handles.
     gather_chunk: u32,
 }
 
 impl GpuStages {
-    /// To come: the scene.
-    pub fn new(context: Arc<Context>, camera: Camera) -> Result<Self, Error> {
+    /// Puts the scene on the device.
+    pub fn new(context: Arc<Context>, scene: &PackedScene, camera: Camera) -> Result<Self, Error> {
         use Access::{Read, Write};
-        let shared = Shared::new(&context);
+        let shared = Shared::new(&context, SceneBuffers::new(&context, scene, &camera)?);
         let modules = Modules::new(&context, &shared);
+        let trace_eye = modules.kernel("eye", "trace_eye", &[Write])?;
+        let paths = PhotonPaths::new(&modules)?;
         let index = Index::new(&modules)?;
         let gather = modules.kernel("gather", "gather", &[Read, Read, Read, Read, Write])?;
         let accumulate = modules.kernel("accumulate", "accumulate", &[Read, Write])?;
@@ -58,6 +69,8 @@ impl GpuStages {
             context,
             shared,
             camera,
+            trace_eye,
+            paths,
             index,
             gather,
             accumulate,
@@ -73,6 +86,7 @@ impl GpuStages {
             n_photons: 0,
             film_size: [0, 0],
             n_iterations: 0,
+            eye_chunk: FIRST_CHUNK,
             gather_chunk: FIRST_CHUNK,
         })
     }
@@ -86,9 +100,11 @@ impl GpuStages {
         Ok(())
     }
 
-    /// Parts of the film, pixels: first and number.
-    fn chunks(n_pixels: u32, chunk: u32) -> impl Iterator<Item = (u32, u32)> {
-        (0..n_pixels).step_by(chunk as usize).map(move |first| (first, chunk.min(n_pixels - first)))
+    /// Parts of the film of about `chunk` pixels: first row and number of rows.
+    fn chunks(frame: &Frame, chunk: u32) -> impl Iterator<Item = (u32, u32)> + use<> {
+        let height = frame.height;
+        let rows = (chunk / frame.width.max(1)).next_multiple_of(ROW_STEP).max(ROW_STEP);
+        (0..height).step_by(rows as usize).map(move |first| (first, rows.min(height - first)))
     }
 
     /// The boxes of the tree, all levels, leaves first.
@@ -111,13 +127,18 @@ impl GpuStages {
         self.readback.read(&self.context, &self.shared, array.raw(), n as usize)
     }
 
-    fn check_pixels(&self, frame: &Frame) -> Result<u32, Error> {
+    fn check_pixels(&self, frame: &Frame) -> Result<(), Error> {
         let n = frame.width * frame.height;
         if n == self.n_pixels {
-            return Ok(n);
+            return Ok(());
         }
         Err(self.context.error(format!("{n} pixels are asked for, {} have eye vertices", self.n_pixels)))
     }
+}
+
+/// Workgroups for a part of the film.
+fn tiles(width: u32, rows: u32) -> u32 {
+    width.div_ceil(8) * rows.div_ceil(8)
 }
 
 /// What can be read back.
@@ -139,12 +160,33 @@ impl Stages for GpuStages {
         self.camera
     }
 
-    fn trace_eye(&mut self, _frame: &Frame) -> Result<(), Error> {
-        Err(self.context.error("eye paths are still to come".to_owned()))
+    fn trace_eye(&mut self, frame: &Frame) -> Result<(), Error> {
+        let n_pixels = frame.width * frame.height;
+        self.reserve_pixels(n_pixels)?;
+        self.shared.set_frame(&self.context, frame);
+        let mut batch = Batch::new(&self.context, &self.shared, "eye");
+        self.timer.begin(Stage::Eye, &mut batch);
+        for (first, rows) in Self::chunks(frame, self.eye_chunk) {
+            if first > 0 {
+                batch.submit()?;
+                batch = Batch::new(&self.context, &self.shared, "eye");
+            }
+            let buffers = [self.eye_vertices.range(first * frame.width, rows * frame.width)];
+            batch.dispatch(&self.trace_eye, &buffers, [rows, first, 0, 0], tiles(frame.width, rows));
+        }
+        self.timer.end(Stage::Eye, batch, &self.context)
     }
 
-    fn trace_photons(&mut self, _frame: &Frame) -> Result<(), Error> {
-        Err(self.context.error("photon paths are still to come".to_owned()))
+    fn trace_photons(&mut self, frame: &Frame) -> Result<(), Error> {
+        self.n_photons = self.paths.trace(
+            &self.context,
+            &self.shared,
+            frame,
+            &mut self.photons,
+            &mut self.readback,
+            &mut self.timer,
+        )?;
+        Ok(())
     }
 
     fn build_index(&mut self, frame: &Frame) -> Result<(), Error> {
@@ -162,17 +204,18 @@ impl Stages for GpuStages {
     }
 
     fn gather(&mut self, frame: &Frame) -> Result<(), Error> {
-        let n_pixels = self.check_pixels(frame)?;
+        self.check_pixels(frame)?;
         self.index.reserve(&self.context, 0)?;
         self.photons.reserve(&self.context, 0)?;
         self.shared.set_frame(&self.context, frame);
         let mut batch = Batch::new(&self.context, &self.shared, "gather");
         self.timer.begin(Stage::Gather, &mut batch);
-        for (first, n) in Self::chunks(n_pixels, self.gather_chunk) {
+        for (first, rows) in Self::chunks(frame, self.gather_chunk) {
             if first > 0 {
                 batch.submit()?;
                 batch = Batch::new(&self.context, &self.shared, "gather");
             }
+            let (first, n) = (first * frame.width, rows * frame.width);
             let buffers = [
                 self.eye_vertices.range(first, n),
                 self.first_radii.range(first, n),
@@ -180,21 +223,22 @@ impl Stages for GpuStages {
                 self.index.boxes.all(),
                 self.radiance.range(first, n),
             ];
-            let arguments = self.index.arguments([n, self.n_photons, 0, 0]);
-            batch.dispatch(&self.gather, &buffers, arguments, n.div_ceil(THREADS));
+            let arguments = self.index.arguments([rows, self.n_photons, 0, 0]);
+            batch.dispatch(&self.gather, &buffers, arguments, tiles(frame.width, rows));
         }
         self.timer.end(Stage::Gather, batch, &self.context)
     }
 
     fn accumulate(&mut self, frame: &Frame) -> Result<(), Error> {
-        let n_pixels = self.check_pixels(frame)?;
+        self.check_pixels(frame)?;
         self.shared.set_frame(&self.context, frame);
         let mut batch = Batch::new(&self.context, &self.shared, "accumulate");
         self.timer.begin(Stage::Accumulate, &mut batch);
         if frame.iteration <= 1 {
             batch.encoder().clear_buffer(self.film.raw(), 0, None);
         }
-        for (first, n) in Self::chunks(n_pixels, 1 << 20) {
+        for (first, rows) in Self::chunks(frame, MOST_PIXELS) {
+            let (first, n) = (first * frame.width, rows * frame.width);
             let buffers = [self.radiance.range(first, n), self.film.range(first, n)];
             batch.dispatch(&self.accumulate, &buffers, [n, 0, 0, 0], n.div_ceil(THREADS));
         }
@@ -245,10 +289,10 @@ impl Stages for GpuStages {
 
     fn times(&mut self) -> Result<StageTimes, Error> {
         let times = self.timer.read(&self.context, &self.shared, &mut self.readback)?;
-        if times.gather > 0.0 {
-            let pixels = f64::from(self.n_pixels) * DISPATCH_SECONDS / times.gather;
-            let steps = (pixels / f64::from(PIXEL_STEP)).clamp(1.0, 256.0) as u32;
-            self.gather_chunk = steps * PIXEL_STEP;
+        for (seconds, chunk) in [(times.eye, &mut self.eye_chunk), (times.gather, &mut self.gather_chunk)] {
+            if seconds > 0.0 {
+                *chunk = (f64::from(self.n_pixels) * DISPATCH_SECONDS / seconds).min(f64::from(MOST_PIXELS)) as u32;
+            }
         }
         Ok(times)
     }

@@ -1,5 +1,6 @@
 //! The program as its users meet it: what it prints, what it writes, how it exits.
 
+use std::f32::consts::FRAC_1_SQRT_2;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Output, Stdio};
@@ -53,7 +54,7 @@ fn floor() -> Value {
         "nodes": [
             {"mesh": 0},
             {"translation": [0.0, 2.0, 0.0], "extensions": {"KHR_lights_punctual": {"light": 0}}},
-            {"camera": 0, "translation": [0.0, 3.0, 0.0], "rotation": [-0.70710678, 0.0, 0.0, 0.70710678]},
+            {"camera": 0, "translation": [0.0, 3.0, 0.0], "rotation": [-FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2]},
         ],
         "cameras": [{"name": "Above", "type": "perspective", "perspective": {"aspectRatio": 2.0, "yfov": 0.5, "znear": 0.1}}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
@@ -499,4 +500,24 @@ fn scenes_and_export() {
     assert!(output.status.success() && output.stderr.is_empty(), "{}", stderr(&output));
     assert_error(&sunfleck(folder.path(), words("export cornell -o box.obj")), 2, &[".glb"]);
     assert_error(&sunfleck(folder.path(), words("export absent.glb -o b.glb")), 1, &["absent.glb"]);
+}
+
+#[cfg(feature = "gpu")]
+#[test]
+fn both_backends_make_the_same_picture() {
+    let folder = folder_with_floor();
+    let list = String::from_utf8(sunfleck(folder.path(), ["--list-devices"]).stdout).unwrap();
+    if list.lines().count() < 2 {
+        assert!(std::env::var_os("SUNFLECK_REQUIRE_GPU").is_none_or(|v| v != "1"), "no GPU adapter");
+        println!("skipped: no GPU adapter");
+        return;
+    }
+    let args = "render floor.gltf -r 32x16 --photons 2k --iterations 2 --radius 0.2";
+    for backend in ["cpu", "gpu"] {
+        let output = sunfleck(folder.path(), words(&format!("{args} --backend {backend} -o {backend}.exr")));
+        assert!(output.status.success(), "{}", stderr(&output));
+    }
+    let read = |name: &str| output::exr::read(&folder.path().join(name)).unwrap();
+    let difference = output::compare::compare(&read("gpu.exr"), &read("cpu.exr")).unwrap();
+    assert!(difference.rel_mse_trimmed < 1e-4 && difference.relative_mean_difference.abs() < 1e-3, "{difference:?}");
 }

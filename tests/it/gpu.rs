@@ -7,6 +7,7 @@ use sunfleck::gpu::{Choice, Context, GpuStages};
 use sunfleck::layout::{self, Camera, EyeVertex, FANOUT, Frame, LEAF_SIZE, Photon, PointBox};
 use sunfleck::math::{morton, oct, rng};
 use sunfleck::ppm::{Error, Stages, film};
+use sunfleck::scene::PackedScene;
 
 /// The device that all tests share; `None` without an adapter.
 pub fn context() -> Option<Arc<Context>> {
@@ -28,7 +29,9 @@ pub fn context() -> Option<Arc<Context>> {
 fn stages() -> Option<MutexGuard<'static, GpuStages>> {
     static STAGES: OnceLock<Mutex<GpuStages>> = OnceLock::new();
     let context = context()?;
-    let stages = STAGES.get_or_init(|| Mutex::new(GpuStages::new(context, Camera::default()).expect("stages")));
+    let stages = STAGES.get_or_init(|| {
+        Mutex::new(GpuStages::new(context, &PackedScene::default(), Camera::default()).expect("stages"))
+    });
     Some(stages.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
 }
 
@@ -66,17 +69,14 @@ fn photon_sets() -> Vec<(&'static str, Vec<Photon>)> {
     ]
 }
 
-/// Morton keys of all photons, in the cube over their bounds.
+/// Morton keys of all photons, in their bounds.
 fn keys(photons: &[Photon]) -> Vec<u64> {
     let at = |p: &Photon| Vec3::from(p.position);
     let low = photons.iter().map(at).reduce(Vec3::min).unwrap_or_default();
     let high = photons.iter().map(at).reduce(Vec3::max).unwrap_or_default();
-    let extent = (high - low).max_element();
+    let scale = (high - low).map(|extent| if extent < 1e-30 { 0.0 } else { morton::CELLS / extent });
     let key = |p: &Photon| {
-        if extent <= 1e-30 {
-            return 0;
-        }
-        let cell = ((at(p) - low) * (morton::CELLS / extent)).clamp(Vec3::ZERO, Vec3::splat(morton::CELLS - 1.0));
+        let cell = ((at(p) - low) * scale).clamp(Vec3::ZERO, Vec3::splat(morton::CELLS - 1.0));
         morton::interleave(cell.to_array().map(|c| c as u32))
     };
     photons.iter().map(key).collect()
@@ -129,7 +129,7 @@ fn eye_vertex(photons: &[Photon], i: u32) -> EyeVertex {
         shading_normal: oct::encode((normal + Vec3::new(0.1, 0.0, 0.0)).normalize()),
         diffuse: [0.2, 0.1, 0.3],
         radiance: [0.01, 0.02, 0.03],
-        transmission: if i % 5 == 0 { 0.5 } else { 0.0 },
+        transmission: if i.is_multiple_of(5) { 0.5 } else { 0.0 },
         ..Default::default()
     }
 }
@@ -148,7 +148,6 @@ fn brute_force(frame: &Frame, vertex: &EyeVertex, radius: f32, photons: &[Photon
             let delta = (Vec3::from(p.position) - x).as_dvec3();
             let t2 = delta.length_squared() / (r * r);
             let cosine = normal.dot(oct::decode24(p.normal_and_segments).as_dvec3());
-            let cosine = if vertex.transmission > 0.0 { cosine.abs() } else { cosine };
             let off = delta.dot(normal).abs() / (0.1 * r);
             let side = oct::decode(p.direction).as_dvec3().dot(shading);
             let segments = (vertex.flags >> 8 & 255) + (p.normal_and_segments >> 24);
@@ -277,7 +276,7 @@ fn what_does_not_fit_is_refused_with_its_size() {
     }
     let mut context = Context::new(&Choice::Any).expect("a second device");
     context.set_budget(1 << 20);
-    let mut gpu = GpuStages::new(Arc::new(context), Camera::default()).expect("stages");
+    let mut gpu = GpuStages::new(Arc::new(context), &PackedScene::default(), Camera::default()).expect("stages");
     gpu.set_photons(&vec![Photon::default(); 1000]).expect("within the budget");
     match gpu.set_photons(&vec![Photon::default(); 100_000]) {
         Err(Error::TooLarge { what, needed, allowed, .. }) => {
@@ -294,7 +293,7 @@ fn a_lost_device_is_an_error() {
         return;
     }
     let context = Arc::new(Context::new(&Choice::Any).expect("a second device"));
-    let mut gpu = GpuStages::new(Arc::clone(&context), Camera::default()).expect("stages");
+    let mut gpu = GpuStages::new(Arc::clone(&context), &PackedScene::default(), Camera::default()).expect("stages");
     context.destroy();
     let result = gpu.set_photons(&[Photon::default(); 10]).and_then(|()| gpu.photons());
     assert!(matches!(result, Err(Error::Device { .. })), "{result:?}");

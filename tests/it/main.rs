@@ -1,5 +1,7 @@
 //! Integration tests.
 
+#[cfg(all(feature = "render", feature = "gpu"))]
+mod backends;
 #[cfg(feature = "render")]
 mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
@@ -9,4 +11,5 @@ mod layering;
 mod layout;
 #[cfg(feature = "render")]
 mod loading;
+#[cfg(feature = "render")]
 mod physics;

@@ -87,7 +87,7 @@ impl Device {
         Ok(match self {
             Self::Cpu => Box::new(CpuStages::new(scene, camera, params.film_size())),
             #[cfg(feature = "gpu")]
-            Self::Gpu(context) => Box::new(GpuStages::new(Arc::clone(context), camera)?),
+            Self::Gpu(context) => Box::new(GpuStages::new(Arc::clone(context), &scene, camera)?),
         })
     }
 }

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Result, anyhow, bail};
 use sunfleck::layout::Camera;
 use sunfleck::output::{self, Picture};
 use sunfleck::ppm::{self, Error, Film, FirstRadius, Params, RadiusSchedule, Stages};
@@ -35,6 +35,11 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode> {
         run.describe(&input, &progress);
     }
 
+    if stop.asked() {
+        progress.finish();
+        progress.say("interrupted before the first iteration: nothing to save");
+        return Ok(ExitCode::from(crate::INTERRUPTED));
+    }
     let began = Instant::now();
     let end = loop {
         let i = run.report.iterations.len() as u32 + 1;
@@ -237,7 +242,7 @@ impl<'a> Run<'a> {
                 Err(error) => first_error = first_error.or(Some(error)),
             }
         }
-        first_error.map_or(Ok(()), |error| Err(error).context("the picture is lost"))
+        first_error.map_or(Ok(()), |error| Err(error.into()))
     }
 
     /// "saved a.exr, b.png after 64 iterations".
