@@ -32,6 +32,8 @@ const PRIMITIVE_INWARD: u32 = 2u;
 const PRIMITIVE_MIRRORED_UV: u32 = 4u;
 const PRIMITIVE_ALPHA: u32 = 8u;
 const PRIMITIVE_SINGLE_SIDED: u32 = 16u;
+const PRIMITIVE_PLAIN: u32 = 32u;
+const PRIMITIVE_FLAT: u32 = 64u;
 
 struct Vertex {
     normal: vec3<f32>,

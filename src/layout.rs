@@ -65,6 +65,10 @@ pub const PRIMITIVE_MIRRORED_UV: u32 = 4;
 pub const PRIMITIVE_ALPHA: u32 = 8;
 /// The eye does not see the back face.
 pub const PRIMITIVE_SINGLE_SIDED: u32 = 16;
+/// Neither texture coordinates nor vertex colours are needed.
+pub const PRIMITIVE_PLAIN: u32 = 32;
+/// The shading normal is the geometric one.
+pub const PRIMITIVE_FLAT: u32 = 64;
 
 /// What is interpolated over a triangle.
 #[repr(C)]

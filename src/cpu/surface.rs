@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::texture::{self, Attributes};
 use super::trace::{self, Hit};
-use crate::layout::{MATERIAL_DOUBLE_SIDED, NONE, PRIMITIVE_MIRRORED_UV, PRIMITIVE_SPHERE, Primitive};
+use crate::layout::{MATERIAL_DOUBLE_SIDED, NONE, PRIMITIVE_FLAT, PRIMITIVE_MIRRORED_UV, PRIMITIVE_SPHERE, Primitive};
 use crate::math::frame::Frame;
 use crate::scene::PackedScene;
 
@@ -104,7 +104,7 @@ fn shading_normal(
     direction: Vec3,
 ) -> Vec3 {
     let facing = |n: Vec3| if front { n } else { -n };
-    if p.flags & PRIMITIVE_SPHERE != 0 {
+    if p.flags & (PRIMITIVE_SPHERE | PRIMITIVE_FLAT) != 0 {
         return facing(outward);
     }
     let m = &scene.materials[p.material as usize];

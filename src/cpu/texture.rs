@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3, Vec4};
 use half::f16;
 
-use crate::layout::{self, NONE, PRIMITIVE_SPHERE, Primitive, Vertex};
+use crate::layout::{self, NONE, PRIMITIVE_PLAIN, PRIMITIVE_SPHERE, Primitive, Vertex};
 use crate::scene::PackedScene;
 
 /// Texture coordinates of both sets and vertex colour at a point of a primitive.
@@ -24,10 +24,16 @@ fn color(v: &Vertex) -> Vec4 {
     Vec4::new(r, g, b, a)
 }
 
+/// Where there is nothing to interpolate.
+const PLAIN: Attributes = Attributes { uv: [Vec2::ZERO; 2], color: Vec4::ONE };
+
 /// Interpolated with the weights `u`, `v` of the second and third corner.
 pub fn attributes(scene: &PackedScene, p: &Primitive, u: f32, v: f32) -> Attributes {
     if p.flags & PRIMITIVE_SPHERE != 0 {
-        return Attributes { uv: [Vec2::ZERO; 2], color: Vec4::ONE };
+        return PLAIN;
+    }
+    if p.flags & PRIMITIVE_PLAIN != 0 {
+        return PLAIN;
     }
     let [a, b, c] = p.vertices.map(|i| &scene.vertices[i as usize]);
     let w = 1.0 - u - v;

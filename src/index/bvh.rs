@@ -245,7 +245,7 @@ impl Octet {
     /// Bit i: box i comes within √bound of the centre.
     #[inline]
     fn within(&self, c: &[f32x8; 3], bound: f32) -> u32 {
-        let outside = |axis: usize| (self.min[axis] - c[axis]).max(c[axis] - self.max[axis]).max(f32x8::ZERO);
+        let outside = |axis: usize| (self.min[axis] - c[axis]).fast_max(c[axis] - self.max[axis]).fast_max(f32x8::ZERO);
         let (x, y, z) = (outside(0), outside(1), outside(2));
         (x * x + y * y + z * z).simd_le(f32x8::splat(bound)).to_bitmask() as u32
     }

@@ -11,7 +11,7 @@ use tempfile::{Builder, NamedTempFile};
 
 use super::Error;
 
-/// Says now whether [`write`] could write `path` later: before hours of work, not after them.
+/// Says now whether [`write()`] could write `path` later: before hours of work, not after them.
 pub fn check(path: &Path) -> Result<(), Error> {
     temporary(&target(path)).map(drop).map_err(|error| Error::write(path, error))
 }

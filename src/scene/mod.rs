@@ -134,6 +134,18 @@ impl Default for Material {
 }
 
 impl Material {
+    /// Whether any texture is used.
+    pub fn is_textured(&self) -> bool {
+        let textures = [
+            &self.base_color_texture,
+            &self.metallic_roughness_texture,
+            &self.normal_texture,
+            &self.emission_texture,
+            &self.transmission_texture,
+        ];
+        textures.iter().any(|t| t.is_some())
+    }
+
     /// A pure Lambertian reflector.
     pub fn diffuse(name: &str, base_color: Vec3) -> Self {
         Self { name: name.into(), base_color, specular: 0.0, ..Self::default() }

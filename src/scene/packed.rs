@@ -161,6 +161,12 @@ impl PackedScene {
             if !material.double_sided && material.transmission == 0.0 {
                 flags |= layout::PRIMITIVE_SINGLE_SIDED;
             }
+            if no_normals && material.normal_texture.is_none() {
+                flags |= layout::PRIMITIVE_FLAT;
+            }
+            if mesh.colors.is_empty() && !material.is_textured() {
+                flags |= layout::PRIMITIVE_PLAIN;
+            }
             for t in &mesh.triangles {
                 let [a, b, c] = t.map(|i| mesh.positions[i as usize].to_array());
                 let mirrored = tangents.get(t[0] as usize).is_some_and(|t| t.w < 0.0);

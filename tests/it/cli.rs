@@ -1,5 +1,6 @@
 //! The program as its users meet it: what it prints, what it writes, how it exits.
 
+use std::f32::consts::FRAC_1_SQRT_2;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Output, Stdio};
@@ -53,7 +54,7 @@ fn floor() -> Value {
         "nodes": [
             {"mesh": 0},
             {"translation": [0.0, 2.0, 0.0], "extensions": {"KHR_lights_punctual": {"light": 0}}},
-            {"camera": 0, "translation": [0.0, 3.0, 0.0], "rotation": [-0.70710678, 0.0, 0.0, 0.70710678]},
+            {"camera": 0, "translation": [0.0, 3.0, 0.0], "rotation": [-FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2]},
         ],
         "cameras": [{"name": "Above", "type": "perspective", "perspective": {"aspectRatio": 2.0, "yfov": 0.5, "znear": 0.1}}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
@@ -445,4 +446,78 @@ fn comparison() {
     );
     assert_error(&sunfleck(folder.path(), words("compare a.exr absent.exr")), 1, &["absent.exr"]);
     assert_error(&sunfleck(folder.path(), words("compare a.exr floor.gltf")), 1, &["floor.gltf"]);
+}
+
+#[test]
+fn the_command_line_overrides_set_and_set_overrides_the_file() {
+    let folder = folder_with_floor();
+    let settings = "scene = \"floor.gltf\"\nsize = [16, 8]\nphotons = \"1k\"\niterations = 2\nseed = 5\nalpha = 0.5\n\
+        [camera]\nposition = [0.0, 6.0, 0.0]\n";
+    fs::create_dir(folder.path().join("sub")).unwrap();
+    fs::write(folder.path().join("floor.toml"), settings).unwrap();
+    let args = "render ../floor.toml -o a.exr --json a.json --backend cpu --set photons=2k --set alpha=0.6 --alpha 0.7";
+    let output = sunfleck(&folder.path().join("sub"), words(args));
+    assert!(output.status.success(), "{}", stderr(&output));
+    let report: Value = serde_json::from_slice(&fs::read(folder.path().join("sub/a.json")).unwrap()).unwrap();
+    let settings = &report["settings"];
+    assert_eq!(
+        (&settings["size"], &settings["seed"], &settings["iterations"]),
+        (&json!([16, 8]), &json!(5), &json!(2))
+    );
+    assert_eq!(settings["photonPaths"], 2000);
+    assert!((settings["alpha"].as_f64().unwrap() - 0.7).abs() < 1e-6);
+    let meta = MetaData::read_from_file(folder.path().join("sub/a.exr"), true).unwrap();
+    let m = glam::Mat4::from_cols_array(&meta.headers[0].own_attributes.world_to_camera.unwrap());
+    assert!(m.transform_point3(glam::Vec3::ZERO).abs_diff_eq(glam::vec3(0.0, 0.0, -6.0), 1e-5), "{m}");
+
+    fs::write(folder.path().join("wrong.toml"), "scene = \"floor.gltf\"\nphotons = -1\n").unwrap();
+    assert_error(&sunfleck(folder.path(), words("render wrong.toml -o a.png")), 1, &["wrong.toml:2", "photons"]);
+    fs::write(folder.path().join("absent.toml"), "scene = \"absent.glb\"\n").unwrap();
+    assert_error(&sunfleck(folder.path(), words("render absent.toml -o a.png")), 1, &["absent.glb"]);
+}
+
+#[test]
+fn a_scene_without_light_gets_some_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut scene = floor();
+    scene["scenes"][0]["nodes"] = json!([0, 2]);
+    write_scene(folder.path(), &scene, &CORNERS, &INDICES);
+    let output = render(folder.path(), "-o a.exr");
+    assert!(output.status.success());
+    assert!(stderr(&output).starts_with("sunfleck: warning: "), "{}", stderr(&output));
+    let picture = output::exr::read(&folder.path().join("a.exr")).unwrap();
+    assert!(picture.rgb[8 * 32 + 16][0] > 0.01);
+}
+
+#[test]
+fn scenes_and_export() {
+    let folder = tempfile::tempdir().unwrap();
+    let list = String::from_utf8(sunfleck(folder.path(), ["scenes"]).stdout).unwrap();
+    assert_eq!(list.lines().count(), sunfleck::scene::shipped::NAMES.len());
+    assert!(sunfleck(folder.path(), words("export cornell -o box.glb")).status.success());
+    let args = "render box.glb -o a.exr --backend cpu -r 16x16 --photons 1k --iterations 1 -q";
+    let output = sunfleck(folder.path(), words(args));
+    assert!(output.status.success() && output.stderr.is_empty(), "{}", stderr(&output));
+    assert_error(&sunfleck(folder.path(), words("export cornell -o box.obj")), 2, &[".glb"]);
+    assert_error(&sunfleck(folder.path(), words("export absent.glb -o b.glb")), 1, &["absent.glb"]);
+}
+
+#[cfg(feature = "gpu")]
+#[test]
+fn both_backends_make_the_same_picture() {
+    let folder = folder_with_floor();
+    let list = String::from_utf8(sunfleck(folder.path(), ["--list-devices"]).stdout).unwrap();
+    if list.lines().count() < 2 {
+        assert!(std::env::var_os("SUNFLECK_REQUIRE_GPU").is_none_or(|v| v != "1"), "no GPU adapter");
+        println!("skipped: no GPU adapter");
+        return;
+    }
+    let args = "render floor.gltf -r 32x16 --photons 2k --iterations 2 --radius 0.2";
+    for backend in ["cpu", "gpu"] {
+        let output = sunfleck(folder.path(), words(&format!("{args} --backend {backend} -o {backend}.exr")));
+        assert!(output.status.success(), "{}", stderr(&output));
+    }
+    let read = |name: &str| output::exr::read(&folder.path().join(name)).unwrap();
+    let difference = output::compare::compare(&read("gpu.exr"), &read("cpu.exr")).unwrap();
+    assert!(difference.rel_mse_trimmed < 1e-4 && difference.relative_mean_difference.abs() < 1e-3, "{difference:?}");
 }

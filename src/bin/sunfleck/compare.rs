@@ -17,15 +17,20 @@ pub fn run(args: &CompareArgs) -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     crate::print(&format!(
-        "relMSE             {:.6}\nrelMSE, trimmed    {:.6}\nmean difference    {:+.6} ({:+.3} %)\nlargest difference {:.6}",
-        d.rel_mse,
-        d.rel_mse_trimmed,
-        d.mean_difference,
+        "relMSE             {}\nrelMSE, trimmed    {}\nmean difference    {} ({:+.4} %)\nlargest difference {}",
+        digits(d.rel_mse),
+        digits(d.rel_mse_trimmed),
+        digits(d.mean_difference),
         100.0 * d.relative_mean_difference,
-        d.max_difference,
+        digits(d.max_difference),
     ));
     if d.not_finite > 0 {
         crate::print(&format!("not finite         {} of {} pixels, left out", d.not_finite, d.not_finite + d.pixels));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Small numbers keep their digits.
+fn digits(x: f64) -> String {
+    if x != 0.0 && x.abs() < 1e-3 { format!("{x:.3e}") } else { format!("{x:.6}") }
 }

@@ -44,9 +44,30 @@ fn main() -> ExitCode {
     };
     done.unwrap_or_else(|error| {
         let usage = error.is::<cli::Usage>();
-        say_error(&format!("{error:#}"));
+        say_error(&chain(&error));
         if usage { ExitCode::from(cli::USAGE) } else { ExitCode::FAILURE }
     })
+}
+
+/// The error and its causes, each said once: some errors have the text of their cause in their own.
+fn chain(error: &anyhow::Error) -> String {
+    error.chain().map(|cause| without_number(&cause.to_string())).fold(String::new(), |text, cause| {
+        match (text.is_empty(), text.contains(&cause)) {
+            (true, _) => cause,
+            (_, true) => text,
+            _ => format!("{text}: {cause}"),
+        }
+    })
+}
+
+/// "No such file or directory (os error 2)" without the number, which says the same.
+fn without_number(text: &str) -> String {
+    match text.split_once(" (os error ") {
+        Some((before, after)) => {
+            before.to_owned() + after.trim_start_matches(|c: char| c.is_ascii_digit()).trim_start_matches(')')
+        }
+        None => text.to_owned(),
+    }
 }
 
 /// One line, whatever is in the message.
@@ -62,4 +83,15 @@ fn one_line(message: &str) -> String {
 fn print(text: &str) {
     use std::io::Write;
     let _ = writeln!(std::io::stdout(), "{text}");
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn causes_are_said_once() {
+        let error = anyhow::anyhow!("No such file (os error 2)").context("b: No such file (os error 2)").context("a");
+        assert_eq!(super::chain(&error), "a: b: No such file");
+        assert_eq!(super::without_number("x (os error 13); y"), "x; y");
+        assert_eq!(super::one_line("a\n  b\tc"), "a b c");
+    }
 }

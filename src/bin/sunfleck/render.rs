@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Result, anyhow, bail};
 use sunfleck::layout::Camera;
 use sunfleck::output::{self, Picture};
 use sunfleck::ppm::{self, Error, Film, FirstRadius, Params, RadiusSchedule, Stages};
@@ -35,6 +35,11 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode> {
         run.describe(&input, &progress);
     }
 
+    if stop.asked() {
+        progress.finish();
+        progress.say("interrupted before the first iteration: nothing to save");
+        return Ok(ExitCode::from(crate::INTERRUPTED));
+    }
     let began = Instant::now();
     let end = loop {
         let i = run.report.iterations.len() as u32 + 1;
@@ -161,7 +166,7 @@ impl<'a> Run<'a> {
         }
         if save {
             if let Err(error) = self.save_pictures() {
-                progress.say(&format!("sunfleck: warning: {error:#}"));
+                progress.say(&format!("sunfleck: warning: {}", crate::chain(&error)));
             }
             self.saved = Instant::now();
         }
@@ -186,7 +191,7 @@ impl<'a> Run<'a> {
         }
         if let Some(error) = &failure {
             self.report.end = End::Failed;
-            self.report.error = Some(format!("{error:#}"));
+            self.report.error = Some(crate::chain(error));
         }
         if let Some(path) = &self.args.json
             && let Err(error) = self.report.write(path)
@@ -194,7 +199,7 @@ impl<'a> Run<'a> {
             failure = failure.or(Some(error));
         }
         if let Some(error) = failure {
-            bail!("{error:#} ({})", self.summary());
+            bail!("{} ({})", crate::chain(&error), self.summary());
         }
         self.say_result(progress);
         Ok(if self.report.end == End::Interrupted { ExitCode::from(crate::INTERRUPTED) } else { ExitCode::SUCCESS })
@@ -237,7 +242,7 @@ impl<'a> Run<'a> {
                 Err(error) => first_error = first_error.or(Some(error)),
             }
         }
-        first_error.map_or(Ok(()), |error| Err(error).context("the picture is lost"))
+        first_error.map_or(Ok(()), |error| Err(error.into()))
     }
 
     /// "saved a.exr, b.png after 64 iterations".

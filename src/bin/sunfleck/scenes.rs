@@ -15,6 +15,8 @@ use crate::cli::{ExportArgs, Usage};
 
 /// What SCENE stands for.
 pub struct Source {
+    /// As given.
+    name: String,
     /// A scene file, or the name of a shipped scene.
     pub file: PathBuf,
     /// What the settings file says; nothing without one.
@@ -29,14 +31,15 @@ impl Source {
         let path = Path::new(scene);
         if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
             check_name(scene)?;
-            return Ok(Self { file: path.to_owned(), settings: Settings::default(), folder: PathBuf::new() });
+            let name = scene.to_owned();
+            return Ok(Self { name, file: path.to_owned(), settings: Settings::default(), folder: PathBuf::new() });
         }
         let settings = Settings::load(path)?;
         let named = settings.scene.as_ref().with_context(|| format!("{scene}: scene: is missing: it names a file"))?;
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
         let beside = folder.join(named);
         let file = if !beside.exists() && NAMES.contains(&named.as_str()) { named.into() } else { beside };
-        Ok(Self { file, settings, folder })
+        Ok(Self { name: scene.to_owned(), file, settings, folder })
     }
 
     /// Reads the scene as its file has it, or makes a shipped one; with what was not honoured.
@@ -49,10 +52,8 @@ impl Source {
 
     /// Changes a scene as the settings say.
     pub fn apply(&self, loaded: &mut Loaded) -> Result<()> {
-        let warnings = self
-            .settings
-            .apply_to_scene(&mut loaded.scene, &self.folder)
-            .with_context(|| format!("settings for {}", self.file.display()))?;
+        let warnings =
+            self.settings.apply_to_scene(&mut loaded.scene, &self.folder).with_context(|| self.name.clone())?;
         loaded.warnings.extend(warnings);
         Ok(())
     }

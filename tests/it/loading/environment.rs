@@ -71,8 +71,8 @@ fn lies_are_refused() {
 fn damaged_maps_do_not_panic() {
     let folder = Folder::new();
     let original = exr_bytes(16, 8, |x, y| [x as f32, y as f32, 1.0]);
-    for i in 0..original.len().min(600) {
-        for value in [0, 1, 127, 255] {
+    for i in (0..original.len().min(600)).step_by(2) {
+        for value in [0, 255] {
             let mut bytes = original.clone();
             bytes[i] = value;
             if let Ok((map, _)) = load_environment(&folder.write("sky.exr", bytes)) {

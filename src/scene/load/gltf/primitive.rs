@@ -33,6 +33,11 @@ pub(super) fn load_all(
         groups.entry((placement.mesh, deforms)).or_default().push(placement);
     }
     let mut reader = Reader { source, buffers, warnings };
+    for ((mesh_index, _), placements) in &groups {
+        for (i, primitive) in document.meshes[*mesh_index].primitives.iter().enumerate() {
+            reader.reserve(primitive, &format!("meshes[{mesh_index}].primitives[{i}]"), placements.len(), budget)?;
+        }
+    }
     for ((mesh_index, deforming_node), placements) in groups {
         let mesh = &document.meshes[mesh_index];
         let weights = match deforming_node {
@@ -42,7 +47,6 @@ pub(super) fn load_all(
         for (i, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("meshes[{mesh_index}].primitives[{i}]");
             let name = name(document, mesh, &placements, i);
-            reader.reserve(primitive, &place, placements.len(), budget)?;
             let Some(mut local) = reader.primitive(primitive, weights, &place)? else { continue };
             local.name = name;
             local.material = match primitive.material {
