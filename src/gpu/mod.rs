@@ -5,10 +5,12 @@ mod context;
 mod index;
 mod kernels;
 mod photons;
+mod probe;
 mod scene;
 pub mod shaders;
 mod stages;
 mod timer;
 
 pub use context::{Choice, Context, DeviceInfo, DeviceKind, list_devices};
+pub use probe::{BsdfAnswer, BsdfQuery};
 pub use stages::GpuStages;

@@ -26,6 +26,7 @@ const MODULES: &[(&str, &str)] = &[
     ("eye", include_str!("../../shaders/eye.wgsl")),
     ("photons", include_str!("../../shaders/photons.wgsl")),
     ("compact", include_str!("../../shaders/compact.wgsl")),
+    ("probe", include_str!("../../shaders/probe.wgsl")),
     ("bounds", include_str!("../../shaders/bounds.wgsl")),
     ("morton", include_str!("../../shaders/morton.wgsl")),
     ("sort", include_str!("../../shaders/sort.wgsl")),

@@ -7,6 +7,7 @@ use super::context::Context;
 use super::index::Index;
 use super::kernels::{Access, Batch, Kernel, Modules, Shared};
 use super::photons::PhotonPaths;
+use super::probe::{self, BsdfAnswer, BsdfQuery};
 use super::scene::SceneBuffers;
 use super::timer::{Stage, Timer};
 use crate::layout::{Camera, EyeVertex, Frame, Photon, PointBox};
@@ -111,6 +112,11 @@ impl GpuStages {
     pub fn tree(&mut self) -> Result<Vec<PointBox>, Error> {
         let n = self.index.levels.last().map_or(0, |[first, n]| first + n);
         self.read(Source::Boxes, n)
+    }
+
+    /// Asks the BSDF of the shaders: for tests.
+    pub fn ask_bsdf(&mut self, queries: &[BsdfQuery]) -> Result<Vec<BsdfAnswer>, Error> {
+        probe::ask(&self.context, &self.shared, &mut self.readback, queries)
     }
 
     fn read<T: bytemuck::Pod>(&mut self, source: Source, n: u32) -> Result<Vec<T>, Error> {

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use glam::{Mat2, Vec2, Vec3, Vec4};
 use sunfleck::cpu::CpuStages;
-use sunfleck::gpu::GpuStages;
+use sunfleck::cpu::bsdf::{Bsdf, Lobes, Transport};
+use sunfleck::gpu::{BsdfQuery, GpuStages};
 use sunfleck::layout::{EyeVertex, Photon};
 use sunfleck::math::{oct, rng};
 use sunfleck::ppm::{Direct, Params, Stages, iterate};
@@ -317,6 +318,86 @@ fn an_empty_scene_is_black_on_both() {
         assert_eq!(stages.n_photons(), 0);
         assert!(stages.film().expect("film").pixels.iter().all(|p| *p == [0.0; 4]));
     }
+}
+
+/// A random material, as extreme as not.
+fn random_vertex(i: u32) -> EyeVertex {
+    let pick = |v: f32| {
+        if v < 0.3 {
+            0.0
+        } else if v < 0.5 {
+            1.0
+        } else {
+            (v - 0.5) * 2.0
+        }
+    };
+    let ([a, b, c, d], [e, f, g, h], [r, s, t, _]) = (random(i, 10), random(i, 11), random(i, 12));
+    let normal = sunfleck::math::warp::sphere([a, b]);
+    let shading = (normal + 0.3 * pick(c) * sunfleck::math::warp::sphere([d, e])).normalize();
+    EyeVertex {
+        normal: oct::encode(normal),
+        shading_normal: oct::encode(if d < 0.5 { normal } else { shading }),
+        base_color: [r, s, t],
+        roughness: if f < 0.15 { 0.0 } else { f },
+        f0: [0.04 * pick(g); 3],
+        f90: pick(g),
+        metallic: pick(h),
+        transmission: pick(a * 7.0 % 1.0),
+        eta: if b < 0.5 { 1.5 } else { 1.0 / 1.33 },
+        material_flags: u32::from(c < 0.7),
+        ..EyeVertex::default()
+    }
+}
+
+#[test]
+fn the_bsdf_is_the_same_on_both() {
+    let Some((_, mut gpu)) = backends(&everything()) else { return };
+    let packed = PackedScene::new(&everything());
+    let queries: Vec<BsdfQuery> = (0..40_000)
+        .map(|i| {
+            let mut vertex = random_vertex(i / 8);
+            let ([a, b, c, d], [e, f, g, h]) = (random(i, 20), random(i, 21));
+            let shading = oct::decode(vertex.shading_normal);
+            let known = sunfleck::math::warp::sphere([a, b]);
+            vertex.outgoing = oct::encode(if known.dot(shading) < 0.0 { -known } else { known });
+            // Near the mirrored direction too, where the lobes are.
+            let mirrored = known.reflect(shading).normalize();
+            let anywhere = sunfleck::math::warp::sphere([c, d]);
+            let other = if h < 0.5 { anywhere } else { (mirrored + 0.2 * anywhere).normalize() };
+            BsdfQuery { vertex, other: other.to_array(), lobes: 1 + i % 3, u: [e, f, g], transport: i / 3 % 2 }
+        })
+        .collect();
+    let answers = gpu.ask_bsdf(&queries).expect("answers");
+    let (mut differ, mut lit) = (0, 0);
+    for (q, a) in queries.iter().zip(&answers) {
+        let bsdf = Bsdf::of_vertex(&packed, &q.vertex);
+        let lobes = Lobes { diffuse: q.lobes & 1 != 0, specular: q.lobes & 2 != 0 };
+        let transport = [Transport::Radiance, Transport::Importance][q.transport as usize];
+        let (known, other) = (oct::decode(q.vertex.outgoing), Vec3::from(q.other));
+        let value = bsdf.evaluate(known, other, lobes, transport);
+        let pdf = bsdf.pdf(known, other, lobes);
+        let sampled = bsdf.sample(known, lobes, transport, q.u);
+        lit += u32::from(value != Vec3::ZERO && sampled.is_some());
+        let same = close(&value.to_array(), &a.value, 2e-3)
+            && close(&[pdf], &[a.pdf], 2e-3)
+            && u32::from(sampled.is_some()) == a.flags & 1
+            && sampled.is_none_or(|s| {
+                close(&s.direction.to_array(), &a.direction, 2e-3)
+                    && close(&s.weight.to_array(), &a.weight, 2e-3)
+                    && close(&[s.pdf], &[a.sampled_pdf], 5e-3)
+                    && u32::from(s.transmitted) == a.flags >> 1
+            });
+        if !same {
+            differ += 1;
+            if differ <= 5 {
+                println!("{q:?}\n{value} {pdf} {sampled:?}\n{a:?}");
+            }
+        }
+    }
+    println!("{differ} of {} differ, {lit} are not zero", queries.len());
+    assert!(lit > 5000, "only {lit} are not zero");
+    // Peaks so narrow that rounding the half-way vector moves them, and numbers within rounding of a choice.
+    assert!(differ * 500 <= queries.len(), "{differ} of {} differ", queries.len());
 }
 
 /// A closed box with a glass ball and a lamp.
