@@ -35,7 +35,7 @@ fn signed_volume(triangles: &[[[u32; 3]; 3]]) -> f64 {
     triangles.iter().map(|t| corner(t[0]).dot(corner(t[1]).cross(corner(t[2])))).sum::<f64>() / 6.0
 }
 
-fn of<'a>(shape: &'a Shape) -> (&'a [Vec3], &'a [[u32; 3]]) {
+fn of(shape: &Shape) -> (&[Vec3], &[[u32; 3]]) {
     (&shape.positions, &shape.triangles)
 }
 
