@@ -436,20 +436,36 @@ fn speed() {
         for stages in [&mut cpu as &mut dyn Stages, &mut gpu] {
             println!("{name} on {}", stages.device());
             stages.set_first_radii(&vec![0.01; (size * size) as usize]).expect("radii");
-            for i in 1..=4 {
-                let start = std::time::Instant::now();
-                iterate(stages, &params.frame(i)).expect("iteration");
-                let (times, n) = (stages.times().expect("times"), stages.n_photons());
-                println!(
-                    "eye {:.3} photons {:.3} ({n}) build {:.3} gather {:.3} accumulate {:.3}; wall {:.3} s",
-                    times.eye,
-                    times.photons,
-                    times.build,
-                    times.gather,
-                    times.accumulate,
-                    start.elapsed().as_secs_f64()
-                );
+            let mut laps = Vec::new();
+            for i in 0..5 {
+                let frame = params.frame(i + 1);
+                let mut lap = [cpu_seconds(); 5];
+                // Reading the times waits for the device.
+                stages.trace_eye(&frame).and_then(|()| stages.times()).expect("eye");
+                lap[1] = cpu_seconds();
+                stages.trace_photons(&frame).and_then(|()| stages.times()).expect("photons");
+                lap[2] = cpu_seconds();
+                stages.build_index(&frame).and_then(|()| stages.times()).expect("build");
+                lap[3] = cpu_seconds();
+                stages.gather(&frame).and_then(|()| stages.times()).expect("gather");
+                lap[4] = cpu_seconds();
+                stages.accumulate(&frame).expect("accumulate");
+                laps.push([lap[1] - lap[0], lap[2] - lap[1], lap[3] - lap[2], lap[4] - lap[3]]);
             }
+            // The first holds the compilation.
+            let median = |stage: usize| {
+                let mut all: Vec<f64> = laps[1..].iter().map(|lap| lap[stage]).collect();
+                all.sort_by(f64::total_cmp);
+                all[all.len() / 2]
+            };
+            println!(
+                "CPU s: eye {:.2} photons {:.2} build {:.2} gather {:.2}; {} photons",
+                median(0),
+                median(1),
+                median(2),
+                median(3),
+                stages.n_photons()
+            );
         }
     }
 }
