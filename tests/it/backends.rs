@@ -9,7 +9,7 @@ use sunfleck::cpu::bsdf::{Bsdf, Lobes, Transport};
 use sunfleck::gpu::{BsdfQuery, GpuStages};
 use sunfleck::layout::{EyeVertex, Photon};
 use sunfleck::math::{oct, rng};
-use sunfleck::ppm::{Direct, Params, Stages, iterate};
+use sunfleck::ppm::{Direct, Error, Params, Stages, iterate};
 use sunfleck::scene::{
     AlphaMode, Camera, Environment, Image, Material, Mesh, PackedScene, PunctualKind, PunctualLight, Scene, Sphere,
     Texture, Wrap,
@@ -306,6 +306,36 @@ fn whole_iterations_agree() {
     let (mean, d, error) = difference(a.pixels.iter().map(value), b.pixels.iter().map(value));
     println!("mean {mean}, difference {d} ± {error}");
     assert!(d.abs() <= 4.0 * error + 1e-4 * mean, "mean {mean}, difference {d} ± {error}");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bits_on_the_gpu() {
+    let mut films = Vec::new();
+    for _ in 0..2 {
+        let Some((_, mut gpu)) = backends(&everything()) else { return };
+        gpu.set_first_radii(&vec![0.1; (SIZE * SIZE) as usize]).expect("radii");
+        for i in 1..=2 {
+            iterate(&mut gpu, &params().frame(i)).expect("iteration");
+        }
+        films.push(gpu.film().expect("film").pixels.into_iter().flatten().map(f32::to_bits).collect::<Vec<_>>());
+    }
+    assert!(films[0] == films[1]);
+}
+
+#[test]
+fn textures_larger_than_a_binding_are_refused() {
+    let Some(context) = context() else { return };
+    let n = context.most_bytes_bound() / 4 + 1;
+    if n > 1 << 27 {
+        println!("skipped: the adapter binds more than this test wants to allocate");
+        return;
+    }
+    let scene = PackedScene { texels: vec![0; n as usize], ..PackedScene::new(&everything()) };
+    match GpuStages::new(context, &scene, Default::default()) {
+        Err(Error::TooLarge { what, needed, .. }) => assert_eq!((what.as_str(), needed), ("texels", 4 * n)),
+        Err(other) => panic!("{other}"),
+        Ok(_) => panic!("accepted"),
+    }
 }
 
 #[test]
