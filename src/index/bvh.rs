@@ -208,7 +208,7 @@ impl PointBvh {
                 continue;
             }
             let d2 = self.leaves[child as usize].distance2(&c);
-            let mut inside = d2.simd_le(f32x8::splat(bound(&state))).to_bitmask() as u32;
+            let mut inside = d2.simd_le(f32x8::splat(bound(&state))).to_bitmask();
             if inside == 0 {
                 continue;
             }
@@ -247,7 +247,7 @@ impl Octet {
     fn within(&self, c: &[f32x8; 3], bound: f32) -> u32 {
         let outside = |axis: usize| (self.min[axis] - c[axis]).fast_max(c[axis] - self.max[axis]).fast_max(f32x8::ZERO);
         let (x, y, z) = (outside(0), outside(1), outside(2));
-        (x * x + y * y + z * z).simd_le(f32x8::splat(bound)).to_bitmask() as u32
+        (x * x + y * y + z * z).simd_le(f32x8::splat(bound)).to_bitmask()
     }
 }
 

@@ -7,6 +7,7 @@ mod materials;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use glam::{Mat3, Quat, Vec3};
@@ -69,6 +70,8 @@ pub fn write_glb(scene: &Scene, path: &Path) -> Result<(), ExportError> {
 /// `scene` as the bytes of a binary glTF file.
 pub fn glb_bytes(scene: &Scene) -> Result<Vec<u8>, ExportError> {
     let mut writer = Writer::default();
+    // Cameras are chosen by name and keep theirs.
+    writer.node_names.extend(scene.cameras.iter().map(|c| c.name.clone()));
     for (i, mesh) in scene.meshes.iter().enumerate() {
         writer.mesh(scene, mesh, &format!("mesh {i} `{}`", mesh.name))?;
     }
@@ -119,7 +122,8 @@ struct Writer {
     images: Vec<Value>,
     /// Smallest extent of the meshes of a material, metres.
     thickness: Vec<f32>,
-    extensions: std::collections::BTreeSet<&'static str>,
+    extensions: BTreeSet<&'static str>,
+    node_names: BTreeSet<String>,
 }
 
 impl Writer {
@@ -205,8 +209,20 @@ impl Writer {
         let primitive =
             json!({ "attributes": attributes, "indices": self.accessors.len() - 1, "material": mesh.material });
         self.meshes.push(json!({ "name": mesh.name, "primitives": [primitive] }));
-        self.nodes.push(json!({ "name": mesh.name, "mesh": self.meshes.len() - 1 }));
+        let name = self.node_name(&mesh.name);
+        self.nodes.push(json!({ "name": name, "mesh": self.meshes.len() - 1 }));
         Ok(())
+    }
+
+    /// A name that no other node has: some programs take nodes of one name for one.
+    fn node_name(&mut self, name: &str) -> String {
+        let mut unique = name.to_owned();
+        let mut n = 1;
+        while !self.node_names.insert(unique.clone()) {
+            n += 1;
+            unique = format!("{name} {n}");
+        }
+        unique
     }
 
     fn light(&mut self, light: &PunctualLight) -> Result<(), ExportError> {
@@ -227,7 +243,8 @@ impl Writer {
             }
         };
         self.lights.push(value);
-        let mut node = json!({ "name": place, "extensions": { "KHR_lights_punctual": { "light": index } } });
+        let mut node =
+            json!({ "name": self.node_name(&place), "extensions": { "KHR_lights_punctual": { "light": index } } });
         if light.kind != PunctualKind::Directional {
             node["translation"] = numbers(&light.position.to_array(), &place)?;
         }

@@ -129,7 +129,7 @@ fn eye_vertex(photons: &[Photon], i: u32) -> EyeVertex {
         shading_normal: oct::encode((normal + Vec3::new(0.1, 0.0, 0.0)).normalize()),
         diffuse: [0.2, 0.1, 0.3],
         radiance: [0.01, 0.02, 0.03],
-        transmission: if i % 5 == 0 { 0.5 } else { 0.0 },
+        transmission: if i.is_multiple_of(5) { 0.5 } else { 0.0 },
         ..Default::default()
     }
 }

@@ -1,9 +1,9 @@
 //! Integration tests.
 
-#[cfg(feature = "render")]
-mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod backends;
+#[cfg(feature = "render")]
+mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
 mod layering;
@@ -11,4 +11,5 @@ mod layering;
 mod layout;
 #[cfg(feature = "render")]
 mod loading;
+#[cfg(feature = "render")]
 mod physics;

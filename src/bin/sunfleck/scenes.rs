@@ -103,7 +103,7 @@ fn describe(name: &str) -> &'static str {
         "glass" => "a goblet of red wine and marbles under a small lamp",
         "pool" => "sun through waves onto a mosaic floor, seen from the terrace",
         "bathroom" => "lamps inside thick glass: no light arrives except through it",
-        "fireplace" => "a long room lit by hundreds of small flames and two candles",
+        "fireplace" => "a long room lit by hundreds of small flames in a niche",
         _ => "",
     }
 }

@@ -56,7 +56,7 @@ fn room(b: &mut Builder) {
         bevel: 0.003,
         bond: 0.5,
         tilt: 0.006,
-        variation: 0.10,
+        variation: 0.18,
         seed: 1,
     };
     let (mut ground, mut tiles) = (Shape::default(), Shape::default());
@@ -93,7 +93,7 @@ fn room(b: &mut Builder) {
         bevel: 0.002,
         bond: 0.0,
         tilt: 0.002,
-        variation: 0.03,
+        variation: 0.06,
         seed: 9,
     };
     for (name, color, parity) in [("floor tile, light", 0xD8D2C6, 0), ("floor tile, dark", 0x39424A, 1)] {
@@ -127,15 +127,10 @@ fn vanity(b: &mut Builder, chrome: usize, ceramic: usize) {
     let mut pulls = Shape::default();
     for k in 0..4 {
         let x = -0.70 + 0.35 * k as f32 + if k % 2 == 0 { 0.31 } else { 0.04 };
-        let (y0, y1, z) = (0.56, 0.70, front + 0.042);
-        let path = [
-            Vec3::new(x, y0, front + 0.017),
-            Vec3::new(x, y0, z - 0.008),
-            Vec3::new(x, y0 + 0.012, z),
-            Vec3::new(x, y1 - 0.012, z),
-            Vec3::new(x, y1, z - 0.008),
-            Vec3::new(x, y1, front + 0.017),
-        ];
+        let path = [[0.0, 0.017], [0.0, 0.027], [0.010, 0.039], [0.028, 0.042]];
+        let lower = path.map(|[up, out]| Vec3::new(x, 0.56 + up, front + out));
+        let upper = path.map(|[up, out]| Vec3::new(x, 0.70 - up, front + out));
+        let path: Vec<Vec3> = lower.into_iter().chain(upper.into_iter().rev()).collect();
         pulls.append(Shape::tube(&spline(&path, 6), |_| 0.0045, 16));
     }
     b.add("pulls", pulls, chrome);

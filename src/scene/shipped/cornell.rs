@@ -23,7 +23,7 @@ pub(super) fn scene() -> Scene {
     b.add("left wall", Shape::quad(corner + z, -z, y), red);
     b.add("right wall", Shape::quad(corner + x, z, y), green);
 
-    let lamp = b.material(Material::emitter("lamp", Vec3::new(46.0, 38.5, 29.0)));
+    let lamp = b.material(Material::emitter("lamp", Vec3::new(33.0, 27.8, 21.2)));
     let (w, d) = (0.70, 0.52);
     b.add("lamp", Shape::quad(Vec3::new(-w / 2.0, HEIGHT - 0.012, -d / 2.0), Vec3::X * w, Vec3::Z * d), lamp);
     let frame = b.material(Material::metal("lamp frame", Vec3::splat(0.6), 0.35));

@@ -320,19 +320,38 @@ pub fn normal_of(surface: impl Fn(f32, f32) -> Vec3, u: f32, v: f32) -> Vec3 {
     du.cross(dv).normalize()
 }
 
-/// A smooth curve through `points` (Catmull–Rom), `n` pieces from each to the next.
+/// A smooth curve through `points`, `n` pieces from each to the next: cubics whose directions at the points are those of
+/// parabolas through three of them by chord length (Bessel), so uneven spacing makes no loops.
 pub fn spline(points: &[Vec3], n: usize) -> Vec<Vec3> {
     let last = points.len() - 1;
+    // Direction and length of each piece.
+    let chords: Vec<(Vec3, f32)> = points
+        .windows(2)
+        .map(|p| {
+            let length = p[0].distance(p[1]);
+            ((p[1] - p[0]) / length, length)
+        })
+        .collect();
+    let inner = |i: usize| {
+        let ((a, before), (b, after)) = (chords[i - 1], chords[i]);
+        (a * after + b * before) / (before + after)
+    };
+    let tangent = |i: usize| match i {
+        0 if last == 1 => chords[0].0,
+        0 => 2.0 * chords[0].0 - inner(1),
+        i if i == last => 2.0 * chords[last - 1].0 - inner(last - 1),
+        i => inner(i),
+    };
     let mut path = Vec::with_capacity(last * n + 1);
     for i in 0..last {
-        let (p1, p2) = (points[i], points[i + 1]);
-        let p0 = if i > 0 { points[i - 1] } else { 2.0 * p1 - p2 };
-        let p3 = if i + 2 <= last { points[i + 2] } else { 2.0 * p2 - p1 };
+        let (p, q, length) = (points[i], points[i + 1], chords[i].1);
+        let (dp, dq) = (tangent(i) * length, tangent(i + 1) * length);
         for k in 0..n {
             let t = k as f32 / n as f32;
-            let cubic = (3.0 * (p1 - p2) + p3 - p0) * (t * t * t);
-            let square = (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3) * (t * t);
-            path.push(0.5 * (2.0 * p1 + (p2 - p0) * t + square + cubic));
+            let (t2, t3) = (t * t, t * t * t);
+            path.push(
+                p * (2.0 * t3 - 3.0 * t2 + 1.0) + dp * (t3 - 2.0 * t2 + t) + q * (3.0 * t2 - 2.0 * t3) + dq * (t3 - t2),
+            );
         }
     }
     path.push(points[last]);

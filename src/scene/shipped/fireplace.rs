@@ -29,7 +29,7 @@ pub(super) fn scene() -> Scene {
     fender(&mut b);
     seats(&mut b);
     walls(&mut b);
-    b.camera("sofa", Vec3::new(1.95, 1.42, 2.35), Vec3::new(-0.35, 0.72, -2.6), 42.0, 16.0 / 9.0);
+    b.camera("room", Vec3::new(1.95, 1.42, 2.35), Vec3::new(-0.35, 0.72, -2.6), 42.0, 16.0 / 9.0);
     b.scene
 }
 
@@ -67,7 +67,7 @@ fn room(b: &mut Builder) {
 /// Chimney breast of brick, niche, hearth, mantel.
 fn chimney(b: &mut Builder) {
     let mortar = b.material(Material::diffuse("mortar", srgb(0x8C8378)));
-    let brick = b.material(Material::diffuse("brick", srgb(0x9C4F37)));
+    let brick = b.material(Material::diffuse("brick", srgb(0xB05C40)));
     let soot = b.material(Material::diffuse("sooty brick", srgb(0x443730)));
     let (w, h, back) = (NICHE.x, NICHE.y + HEARTH, NICHE.z);
     let (half, top) = (BREAST_HALF, MAX.y + 0.001);
@@ -95,7 +95,7 @@ fn chimney(b: &mut Builder) {
         bevel: 0.003,
         bond: 0.5,
         tilt: 0.02,
-        variation: 0.22,
+        variation: 0.38,
         seed: 4,
     };
     let lay = |faces: &[(Vec3, Vec3, Vec3)]| {
@@ -128,7 +128,7 @@ fn chimney(b: &mut Builder) {
 /// Candlesticks and a vase on the mantel.
 fn candles(b: &mut Builder) {
     let brass = b.material(Material::metal("polished brass", Vec3::new(0.80, 0.60, 0.28), 0.12));
-    let wax = b.material(glossy("wax", srgb(0xEFE6CF), 0.35));
+    let wax = b.material(glossy("wax", srgb(0xEAE2CE), 0.35));
     let stick = Profile::start(0.0, 0.0)
         .to(0.042, 0.0)
         .crease()
@@ -154,6 +154,7 @@ fn candles(b: &mut Builder) {
         .curve([0.030, 0.23], [0.030, 0.25], [0.046, 0.275], 12)
         .curve([0.044, 0.279], [0.041, 0.277], [0.040, 0.272], 5)
         .curve([0.022, 0.25], [0.022, 0.23], [0.035, 0.21], 10)
+        .crease()
         .to(0.0, 0.20);
     b.add("vase", vase.lathe(96).moved(Vec3::new(0.58, 1.234, BREAST + 0.10)), vase_paint);
 }
@@ -194,7 +195,7 @@ fn fire(b: &mut Builder) {
     b.add("logs", wood, bark);
 
     let mut random = Random::new(404);
-    let ember = b.material(Material::emitter("ember", Vec3::new(660.0, 156.0, 30.0)));
+    let ember = b.material(Material::emitter("ember", Vec3::new(495.0, 117.0, 22.5)));
     let mut embers = Shape::default();
     for _ in 0..150 {
         let at = Vec3::new(
@@ -206,9 +207,9 @@ fn fire(b: &mut Builder) {
     }
     b.add("embers", embers, ember);
     let hues = [
-        ("flame core", Vec3::new(3120.0, 2220.0, 1200.0)),
-        ("flame", Vec3::new(2280.0, 1290.0, 504.0)),
-        ("flame tip", Vec3::new(1260.0, 516.0, 132.0)),
+        ("flame core", Vec3::new(2340.0, 1530.0, 720.0)),
+        ("flame", Vec3::new(1710.0, 855.0, 279.0)),
+        ("flame tip", Vec3::new(945.0, 315.0, 63.0)),
     ];
     let mut tongues: [Shape; 3] = Default::default();
     for _ in 0..340 {

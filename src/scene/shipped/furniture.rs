@@ -129,11 +129,11 @@ pub fn books(length: f32, tallest: f32, colors: &[Vec3], seed: u32) -> Shape {
 pub fn curtain(size: Vec2, folds: usize, seed: u32) -> Shape {
     let surface = move |u: f32, v: f32| {
         let drift = super::pattern::noise(Vec2::new(u * 6.0 + 10.0, 0.5), [64, 1], seed) - 0.5;
-        let phase = std::f32::consts::TAU * folds as f32 * u + 3.0 * drift;
+        let phase = std::f32::consts::TAU * folds as f32 * u + 1.2 * drift;
         let gather = 0.035 + 0.020 * (1.0 - v);
-        Vec3::new((u - 0.5) * size.x + 0.3 * gather * (2.0 * phase).sin(), v * size.y, gather * phase.sin())
+        Vec3::new((u - 0.5) * size.x + 0.08 * gather * (2.0 * phase).sin(), v * size.y, gather * phase.sin())
     };
-    Shape::sheet(24 * folds, 12, |u, v| (surface(u, v), super::curved::normal_of(surface, u, v)))
+    Shape::sheet(36 * folds, 12, |u, v| (surface(u, v), super::curved::normal_of(surface, u, v)))
 }
 
 /// A log from `from` to `to` with rough bark.

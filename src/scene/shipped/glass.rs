@@ -35,20 +35,19 @@ impl Goblet {
             .curve([0.012, 0.0030], [0.022, 0.0012], [0.0335, 0.0008], 10)
             .curve([0.0352, 0.0008], [0.0362, 0.0014], [0.0362, 0.0024], 6)
             .curve([0.0362, 0.0034], [0.0345, 0.0042], [0.0320, 0.0046], 6)
-            .curve([0.0180, 0.0068], [0.0060, 0.0085], [0.0046, 0.0200], 14)
-            .curve([0.0038, 0.0235], [0.0034, 0.0240], [0.0034, 0.0290], 8)
-            .curve([0.0034, 0.0420], [0.0042, 0.0540], [0.0085, 0.0580], 10)
-            .curve([0.0300, 0.0620], [0.0560, 0.0830], [0.0560, 0.1120], 28)
-            .curve([0.0560, 0.1380], [0.0460, 0.1630], [0.0420, 0.1800], 20)
-            .curve([0.0418, 0.1812], [0.0402, 0.1812], [0.0401, 0.1800], 8);
+            .curve([0.0180, 0.0068], [0.0075, 0.0075], [0.0060, 0.0130], 14)
+            .curve([0.0054, 0.0160], [0.0060, 0.0215], [0.0100, 0.0235], 10)
+            .curve([0.0300, 0.0270], [0.0560, 0.0480], [0.0560, 0.0770], 28)
+            .curve([0.0560, 0.1030], [0.0460, 0.1280], [0.0420, 0.1450], 20)
+            .curve([0.0418, 0.1462], [0.0402, 0.1462], [0.0401, 0.1450], 8);
         // Down the inner wall: to the wine's level, then wetted.
-        let inside = outside.curve([0.0440, 0.1630], [0.0540, 0.1390], [0.0543, 0.1160], 18);
+        let inside = outside.curve([0.0440, 0.1280], [0.0538, 0.1060], [0.0543, 0.0830], 18);
         let rim_of_wine = inside.last_index();
         let rim = inside.last();
-        let all = inside.curve([0.0544, 0.1090], [0.0536, 0.1030], [0.0514, 0.0960], 8).curve(
-            [0.0465, 0.0760],
-            [0.0260, 0.0665],
-            [0.0, 0.0655],
+        let all = inside.curve([0.0546, 0.0750], [0.0538, 0.0680], [0.0514, 0.0610], 8).curve(
+            [0.0465, 0.0410],
+            [0.0260, 0.0315],
+            [0.0, 0.0305],
             28,
         );
         let plain = |_| (1.0, 0.0);
@@ -103,8 +102,8 @@ pub(super) fn scene() -> Scene {
     b.add("wine against air", goblet.surface.moved(place), surface);
 
     for (k, (x, z, radius, color)) in [
-        (0.190, 0.028, 0.0125, 0x2E6FD0),
-        (0.176, -0.030, 0.0105, 0xF0A818),
+        (0.160, -0.052, 0.0240, 0x9CC8F0),
+        (0.105, -0.075, 0.0115, 0xF0A818),
         (-0.105, 0.075, 0.0115, 0x2FA860),
         (-0.008, 0.118, 0.0095, 0xE8E8F0),
     ]
@@ -118,14 +117,14 @@ pub(super) fn scene() -> Scene {
         b.add(&format!("marble {k}"), Shape::icosphere(Vec3::new(x, radius + 0.0007, z), radius, 5), material);
     }
 
-    let lamp = b.material(Material::emitter("lamp", Vec3::new(4600.0, 4050.0, 3300.0)));
-    let (at, aim, half) = (Vec3::new(-0.66, 0.98, -0.36), Vec3::new(0.05, 0.06, 0.03), 0.012);
+    let lamp = b.material(Material::emitter("lamp", Vec3::new(6400.0, 5700.0, 4750.0)));
+    let (at, aim, half) = (Vec3::new(-0.78, 0.84, -0.46), Vec3::new(0.05, 0.06, 0.03), 0.012);
     let towards = (aim - at).normalize();
     let (u, v) = towards.any_orthonormal_pair();
     b.add("lamp", Shape::quad(at - (u + v) * half, u * (2.0 * half), v * (2.0 * half)), lamp);
     let soft = b.material(Material::emitter("soft light", Vec3::new(0.55, 0.65, 0.80)));
     b.add("soft light", Shape::quad(Vec3::new(0.75, 0.15, 0.55), Vec3::new(-0.45, 0.0, 0.60), Vec3::Y * 0.9), soft);
 
-    b.camera("table", Vec3::new(0.12, 0.37, 0.58), Vec3::new(0.050, 0.066, 0.012), 25.0, 16.0 / 9.0);
+    b.camera("table", Vec3::new(0.10, 0.34, 0.53), Vec3::new(0.046, 0.042, 0.022), 26.0, 16.0 / 9.0);
     b.scene
 }

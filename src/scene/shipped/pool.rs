@@ -83,7 +83,7 @@ pub(super) fn scene() -> Scene {
         kind: PunctualKind::Directional,
     });
     b.scene.environment = Some(sky());
-    b.camera("terrace", Vec3::new(2.55, 2.85, 4.05), Vec3::new(-0.30, -0.62, -0.42), 40.0, 16.0 / 9.0);
+    b.camera("garden", Vec3::new(2.55, 2.85, 4.05), Vec3::new(-0.30, -0.62, -0.42), 40.0, 16.0 / 9.0);
     b.scene
 }
 
@@ -134,7 +134,7 @@ fn terrace(b: &mut Builder) {
     lay(Vec3::new(-xi, 0.0, -zi), Vec3::Z, 2.0 * zi, -Vec3::X);
     b.add("coping", stones, coping);
 
-    let stone = b.material(glossy("terrace", srgb(0xB9A68C), 0.7));
+    let stone = b.material(glossy("terrace", srgb(0xC4B196), 0.7));
     let joint = b.material(Material::diffuse("terrace joint", srgb(0x6E6456)));
     let (outer_x, outer_z) = (x + 2.2, z + 2.2);
     let ground = TERRACE - 0.012;
@@ -156,7 +156,7 @@ fn terrace(b: &mut Builder) {
         bevel: 0.004,
         bond: 0.5,
         tilt: 0.002,
-        variation: 0.14,
+        variation: 0.25,
         seed: 3,
     };
     let slabs = around(xi + w - 0.005, zi + w - 0.005)
@@ -200,7 +200,7 @@ fn things(b: &mut Builder) {
 
     let rubber = b.material(glossy("beach ball", Vec3::ONE, 0.25));
     let radius = 0.23;
-    let colors = [0xE6E2DA, 0xE03A2F, 0xE6E2DA, 0x2B6FC4, 0xE6E2DA, 0xF2B72C].map(srgb);
+    let colors = [0xE4E0D8, 0xE03A2F, 0xE4E0D8, 0x2B6FC4, 0xE4E0D8, 0xE4AC28].map(srgb);
     let n = 8;
     let mut ball = Shape::default();
     for (k, color) in colors.iter().enumerate() {
@@ -217,7 +217,7 @@ fn things(b: &mut Builder) {
         let height = radius * 0.06f32.cos();
         let disc = Profile::start(rim, height).to(rim * 0.5, height + 0.0003).to(0.0, height + 0.0004).lathe(6 * n);
         let turn = if up > 0.0 { Quat::IDENTITY } else { Quat::from_rotation_x(std::f32::consts::PI) };
-        ball.append(disc.transformed(Affine3A::from_quat(turn)).colored(srgb(0xE6E2DA)));
+        ball.append(disc.transformed(Affine3A::from_quat(turn)).colored(srgb(0xE4E0D8)));
     }
     let pose = Affine3A::from_rotation_translation(
         Quat::from_rotation_z(0.7) * Quat::from_rotation_x(0.5),
@@ -249,7 +249,7 @@ fn things(b: &mut Builder) {
         .crease()
         .to(0.0, 0.40)
         .lathe(64);
-    let leaf = b.material(glossy("leaf", srgb(0x3E7A35), 0.45));
+    let leaf = b.material(glossy("leaf", srgb(0x46863C), 0.45));
     for (k, place) in
         [Vec3::new(-3.9, TERRACE - 0.01, -2.85), Vec3::new(-0.4, TERRACE - 0.01, -3.3)].into_iter().enumerate()
     {
@@ -304,7 +304,7 @@ fn plant(seed: u32) -> Shape {
             let blade = width * (1.0 - v).powf(0.7) * (0.4 + 1.2 * v.min(0.5)) + 0.0008;
             spine(v) + side * ((2.0 * u - 1.0) * blade) + out * (0.3 * blade * (2.0 * u - 1.0).powi(2))
         };
-        let tint = random.between(0.7, 1.15);
+        let tint = random.between(0.6, 1.0);
         let blade = Shape::sheet(2, 10, |u, v| {
             let v = 0.999 * v;
             (point(u, v), super::curved::normal_of(point, u, v.clamp(0.01, 0.98)))

@@ -17,7 +17,7 @@ pub struct Shape {
     pub normals: Vec<Vec3>,
     /// Metres along the surface where a generator gives them; v runs down, as in images.
     pub uvs: Vec<Vec2>,
-    /// Linear RGB factors on the base colour.
+    /// Linear RGB factors in [0, 1] on the base colour.
     pub colors: Vec<Vec3>,
     /// Counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
@@ -254,7 +254,7 @@ pub struct Tiling {
     pub bond: f32,
     /// Largest tilt of a tile, radians: what makes reflections in real tiles lively.
     pub tilt: f32,
-    /// Largest deviation of a tile's brightness from 1.
+    /// By how much tiles are darker than the brightest.
     pub variation: f32,
     /// Of the deviations.
     pub seed: u32,
@@ -283,7 +283,7 @@ impl Tiling {
                 }
                 let mut random = Random::new(self.seed ^ (row * 1009 + column + 7) as u32);
                 let size = Vec2::new(x1 - x0, y1 - y0);
-                let tint = 1.0 + self.variation * random.between(-1.0, 1.0);
+                let tint = 1.0 - self.variation * random.unit();
                 let slope = [random.between(-1.0, 1.0), random.between(-1.0, 1.0)].map(|t| t * self.tilt);
                 let lift = |x: f32, y: f32| self.height + slope[0] * (x - 0.5 * size.x) + slope[1] * (y - 0.5 * size.y);
                 let at = |x: f32, y: f32, z: f32| corner + u * (x0 + x) + v * (y0 + y) + n * z;
@@ -307,19 +307,6 @@ impl Tiling {
 }
 
 impl Shape {
-    /// Adds a flat face: triangles from the first corner to each of the sides away from it, wound so that `normal` is in
-    /// front.
-    pub fn fan(&mut self, corners: &[Vec3], normal: Vec3) {
-        let first = self.positions.len() as u32;
-        let turned = (corners[1] - corners[0]).cross(corners[2] - corners[0]).dot(normal) < 0.0;
-        self.positions.extend(corners);
-        self.normals.extend(corners.iter().map(|_| normal));
-        for k in 1..corners.len() as u32 - 1 {
-            let (b, c) = if turned { (k + 1, k) } else { (k, k + 1) };
-            self.triangles.push([first, first + b, first + c]);
-        }
-    }
-
     /// Adds a flat face of four corners, without texture coordinates.
     fn flat(&mut self, corners: [Vec3; 4]) {
         let first = self.positions.len() as u32;
