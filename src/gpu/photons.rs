@@ -62,7 +62,8 @@ impl PhotonPaths {
         self.counters.reserve(context, u64::from(N_TOTALS + CHUNK + 2 * CHUNK / THREADS))?;
         self.states.reserve(context, u64::from((2 + PATHS) * CHUNK))?;
         if photons.capacity() == 0 {
-            photons.reserve(context, 2 * u64::from(frame.n_paths))?;
+            let most = context.most_bytes_bound() / size_of::<Photon>() as u64;
+            photons.reserve(context, (2 * u64::from(frame.n_paths)).min(most))?;
         }
         let most_rounds = (PATHS * frame.max_photon_segments).div_ceil(SLOTS).max(1);
         loop {
