@@ -25,7 +25,7 @@ pub fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
-/// [`unit`] of each.
+/// [`unit()`] of each.
 #[inline]
 pub fn unit4(bits: [u32; 4]) -> [f32; 4] {
     bits.map(unit)

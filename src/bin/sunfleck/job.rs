@@ -72,6 +72,8 @@ impl Job {
         for pair in &args.set {
             settings.set(pair).map_err(|e| Usage(format!("--set {pair}: {e}")))?;
         }
+        source.locate();
+        let settings = &mut source.settings;
         // What the command line names replaces what the file says, and is not looked for.
         settings.environment = settings.environment.take().filter(|_| args.env.is_none());
         settings.camera = settings.camera.take().filter(|_| args.camera.is_none());

@@ -35,11 +35,19 @@ impl Source {
             return Ok(Self { name, file: path.to_owned(), settings: Settings::default(), folder: PathBuf::new() });
         }
         let settings = Settings::load(path)?;
-        let named = settings.scene.as_ref().with_context(|| format!("{scene}: scene: is missing: it names a file"))?;
+        settings.scene.as_ref().with_context(|| format!("{scene}: scene: is missing: it names a file"))?;
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        let beside = folder.join(named);
-        let file = if !beside.exists() && NAMES.contains(&named.as_str()) { named.into() } else { beside };
-        Ok(Self { name: scene.to_owned(), file, settings, folder })
+        let mut source = Self { name: scene.to_owned(), file: PathBuf::new(), settings, folder };
+        source.locate();
+        Ok(source)
+    }
+
+    /// Finds the scene that the settings name: again, once they were overridden.
+    pub fn locate(&mut self) {
+        if let Some(named) = &self.settings.scene {
+            let beside = self.folder.join(named);
+            self.file = if !beside.exists() && NAMES.contains(&named.as_str()) { named.into() } else { beside };
+        }
     }
 
     /// Reads the scene as its file has it, or makes a shipped one; with what was not honoured.
