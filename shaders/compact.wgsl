@@ -83,6 +83,6 @@ fn compact_write(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_inv
         }
     }
     if alive {
-        states[CHUNK + counters[BLOCKS + 2u * workgroup.x + 1u] + offset.y] = states[thread];
+        states[GOING_ON + counters[BLOCKS + 2u * workgroup.x + 1u] + offset.y] = states[thread];
     }
 }

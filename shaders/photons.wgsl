@@ -4,27 +4,11 @@
 // has more to store goes on in the next round. Nothing is appended by atomics, so the order does not depend on the device.
 #import rng
 #import bsdf_surface
-#import light
 #import photon_paths
-
-struct PathState {
-    origin: vec3<f32>,
-    path: u32,
-    direction: vec3<f32>,
-    dimension: u32,
-    power: vec3<f32>,
-    segments: u32,
-    medium: vec3<f32>,
-    // Paths of the thread still to begin; with ACTIVE, the present one has not ended.
-    left: u32,
-}
-
-const ACTIVE: u32 = 0x80000000u;
 
 // [slot][thread]
 @group(0) @binding(0) var<storage, read_write> slots: array<Photon>;
 @group(0) @binding(1) var<storage, read_write> counters: array<u32>;
-// Where this round's paths are at its end, by thread; after CHUNK of them, where they were at its beginning.
 @group(0) @binding(2) var<storage, read_write> states: array<PathState>;
 
 // Flux crosses the real surface, but the BSDF weighs it by the shading normal's cosine (Veach 1997, §5.3).
@@ -35,23 +19,12 @@ fn photon_shading(s: Surface, incoming: vec3<f32>) -> f32 {
     return clamp(dot(s.shading_normal, incoming) / max(dot(s.normal, incoming), 1e-3), 0.0, 8.0);
 }
 
-// Begins the thread's next path, if there is one.
+// Begins the thread's next path.
 fn photon_begin(state: PathState) -> PathState {
-    var rng = rng_new(STREAM_PHOTON, state.path + 1u, frame.iteration, frame.seed);
-    let u = rng_next4(&rng);
-    let v = rng_next4(&rng);
-    let emission = light_emit(u.xyz, v.xyz);
-    let left = (state.left & ~ACTIVE) - 1u;
-    return PathState(
-        emission.origin,
-        rng.path,
-        emission.direction,
-        rng.dimension,
-        emission.power,
-        0u,
-        vec3(0.0),
-        left | select(0u, ACTIVE, emission.ok),
-    );
+    let path = state.path + 1u;
+    var fresh = states[FRESH + path - arguments.values.y];
+    fresh.left |= state.left - 1u;
+    return fresh;
 }
 
 // Follows the present path by one segment; returns whether it stored a photon.
@@ -126,7 +99,7 @@ fn trace_photons(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_inv
         state.path = arguments.values.y + before - 1u;
         state.left = min(PATHS, arguments.values.x - before);
     } else if thread < counters[COUNT_ALIVE] {
-        state = states[CHUNK + thread];
+        state = states[GOING_ON + thread];
     }
     // The eye's side adds at least one segment.
     let longest = min(frame.max_photon_segments, max(frame.max_segments, 1u) - 1u);

@@ -220,6 +220,11 @@ impl Context {
         &self.info
     }
 
+    /// Most bytes of one array that a shader can see.
+    pub fn most_bytes_bound(&self) -> u64 {
+        self.limits.max_storage_buffer_binding_size
+    }
+
     /// Sets the most bytes that may lie in buffers.
     pub fn set_budget(&mut self, bytes: u64) {
         self.budget = bytes;

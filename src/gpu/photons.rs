@@ -22,6 +22,7 @@ const THREADS: u32 = 64;
 
 /// Kernels and memory of the photon paths.
 pub(super) struct PhotonPaths {
+    emit: Arc<Kernel>,
     trace: Arc<Kernel>,
     offsets: Arc<Kernel>,
     write: Arc<Kernel>,
@@ -36,6 +37,7 @@ impl PhotonPaths {
     pub(super) fn new(modules: &Modules<'_>) -> Result<Self, Error> {
         use Access::{Read, Write};
         Ok(Self {
+            emit: modules.kernel("emit", "emit_photons", &[Write])?,
             trace: modules.kernel("photons", "trace_photons", &[Write, Write, Write])?,
             offsets: modules.kernel("compact", "compact_offsets", &[Read, Write, Write, Write])?,
             write: modules.kernel("compact", "compact_write", &[Read, Write, Write, Write])?,
@@ -58,9 +60,10 @@ impl PhotonPaths {
     ) -> Result<u32, Error> {
         self.slots.reserve(context, u64::from(CHUNK * SLOTS))?;
         self.counters.reserve(context, u64::from(N_TOTALS + CHUNK + 2 * CHUNK / THREADS))?;
-        self.states.reserve(context, u64::from(2 * CHUNK))?;
+        self.states.reserve(context, u64::from((2 + PATHS) * CHUNK))?;
         if photons.capacity() == 0 {
-            photons.reserve(context, 2 * u64::from(frame.n_paths))?;
+            let most = context.most_bytes_bound() / size_of::<Photon>() as u64;
+            photons.reserve(context, (2 * u64::from(frame.n_paths)).min(most))?;
         }
         let most_rounds = (PATHS * frame.max_photon_segments).div_ceil(SLOTS).max(1);
         loop {
@@ -103,6 +106,7 @@ impl PhotonPaths {
             }
             let n = (CHUNK * PATHS).min(frame.n_paths - first);
             let groups = n.div_ceil(THREADS * PATHS);
+            batch.dispatch(&self.emit, &[self.states.all()], [n, first, 0, 0], n.div_ceil(THREADS));
             for round in 0..self.rounds {
                 let buffers = [self.slots.all(), self.counters.all(), self.states.all()];
                 batch.dispatch(&self.trace, &buffers, [n, first, round, 0], groups);

@@ -24,6 +24,7 @@ const LIBRARY: &[(&str, &str)] = &[
 /// Every module with entry points: name and text before composition.
 const MODULES: &[(&str, &str)] = &[
     ("eye", include_str!("../../shaders/eye.wgsl")),
+    ("emit", include_str!("../../shaders/emit.wgsl")),
     ("photons", include_str!("../../shaders/photons.wgsl")),
     ("compact", include_str!("../../shaders/compact.wgsl")),
     ("probe", include_str!("../../shaders/probe.wgsl")),

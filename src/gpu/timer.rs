@@ -18,6 +18,8 @@ pub(super) enum Stage {
 }
 
 const N_STAGES: u32 = 5;
+/// Bytes from one stage's pair of timestamps to the next: they are resolved to multiples of this.
+const SPACING: u64 = wgpu::QUERY_RESOLVE_BUFFER_ALIGNMENT;
 
 /// Timestamps at the beginning and the end of each stage; wall time after waiting where there are none.
 pub(super) struct Timer {
@@ -38,7 +40,7 @@ impl Timer {
             });
             let buffer = context.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("timestamps"),
-                size: u64::from(2 * N_STAGES) * 8,
+                size: u64::from(N_STAGES) * SPACING,
                 usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
                 mapped_at_creation: false,
             });
@@ -78,16 +80,20 @@ impl Timer {
         if let Some((set, buffer)) = &self.queries
             && self.pending.contains(&true)
         {
+            let timed: Vec<u32> = (0..N_STAGES).filter(|stage| self.pending[*stage as usize]).collect();
             let mut batch = Batch::new(context, shared, "timestamps");
-            for stage in (0..N_STAGES).filter(|stage| self.pending[*stage as usize]) {
+            for &stage in &timed {
                 // Each pair on its own: one that was never written may not be resolved.
-                batch.encoder().resolve_query_set(set, 2 * stage..2 * stage + 2, buffer, 0);
-                batch.submit()?;
-                let ticks = readback.read::<u64>(context, shared, buffer, 2)?;
-                let nanoseconds =
-                    ticks[1].saturating_sub(ticks[0]) as f64 * f64::from(context.queue.get_timestamp_period());
-                self.seconds[stage as usize] = nanoseconds * 1e-9;
-                batch = Batch::new(context, shared, "timestamps");
+                let queries = 2 * stage..2 * stage + 2;
+                batch.encoder().resolve_query_set(set, queries, buffer, u64::from(stage) * SPACING);
+            }
+            batch.submit()?;
+            let words = (SPACING / 8) as usize;
+            let ticks: Vec<u64> = readback.read(context, shared, buffer, words * N_STAGES as usize)?;
+            let period = f64::from(context.queue.get_timestamp_period()) * 1e-9;
+            for stage in timed.into_iter().map(|stage| stage as usize) {
+                let [begin, end] = [ticks[stage * words], ticks[stage * words + 1]];
+                self.seconds[stage] = end.saturating_sub(begin) as f64 * period;
             }
             self.pending = [false; 5];
         }

@@ -9,7 +9,7 @@ use sunfleck::cpu::bsdf::{Bsdf, Lobes, Transport};
 use sunfleck::gpu::{BsdfQuery, GpuStages};
 use sunfleck::layout::{EyeVertex, Photon};
 use sunfleck::math::{oct, rng};
-use sunfleck::ppm::{Direct, Params, Stages, iterate};
+use sunfleck::ppm::{Direct, Error, Params, Stages, iterate};
 use sunfleck::scene::{
     AlphaMode, Camera, Environment, Image, Material, Mesh, PackedScene, PunctualKind, PunctualLight, Scene, Sphere,
     Texture, Wrap,
@@ -309,6 +309,36 @@ fn whole_iterations_agree() {
 }
 
 #[test]
+fn the_same_seed_gives_the_same_bits_on_the_gpu() {
+    let mut films = Vec::new();
+    for _ in 0..2 {
+        let Some((_, mut gpu)) = backends(&everything()) else { return };
+        gpu.set_first_radii(&vec![0.1; (SIZE * SIZE) as usize]).expect("radii");
+        for i in 1..=2 {
+            iterate(&mut gpu, &params().frame(i)).expect("iteration");
+        }
+        films.push(gpu.film().expect("film").pixels.into_iter().flatten().map(f32::to_bits).collect::<Vec<_>>());
+    }
+    assert!(films[0] == films[1]);
+}
+
+#[test]
+fn textures_larger_than_a_binding_are_refused() {
+    let Some(context) = context() else { return };
+    let n = context.most_bytes_bound() / 4 + 1;
+    if n > 1 << 27 {
+        println!("skipped: the adapter binds more than this test wants to allocate");
+        return;
+    }
+    let scene = PackedScene { texels: vec![0; n as usize], ..PackedScene::new(&everything()) };
+    match GpuStages::new(context, &scene, Default::default()) {
+        Err(Error::TooLarge { what, needed, .. }) => assert_eq!((what.as_str(), needed), ("texels", 4 * n)),
+        Err(other) => panic!("{other}"),
+        Ok(_) => panic!("accepted"),
+    }
+}
+
+#[test]
 fn an_empty_scene_is_black_on_both() {
     let scene = Scene { cameras: everything().cameras, ..Scene::default() };
     let Some((mut cpu, mut gpu)) = backends(&scene) else { return };
@@ -436,20 +466,36 @@ fn speed() {
         for stages in [&mut cpu as &mut dyn Stages, &mut gpu] {
             println!("{name} on {}", stages.device());
             stages.set_first_radii(&vec![0.01; (size * size) as usize]).expect("radii");
-            for i in 1..=4 {
-                let start = std::time::Instant::now();
-                iterate(stages, &params.frame(i)).expect("iteration");
-                let (times, n) = (stages.times().expect("times"), stages.n_photons());
-                println!(
-                    "eye {:.3} photons {:.3} ({n}) build {:.3} gather {:.3} accumulate {:.3}; wall {:.3} s",
-                    times.eye,
-                    times.photons,
-                    times.build,
-                    times.gather,
-                    times.accumulate,
-                    start.elapsed().as_secs_f64()
-                );
+            let mut laps = Vec::new();
+            for i in 0..5 {
+                let frame = params.frame(i + 1);
+                let mut lap = [cpu_seconds(); 5];
+                // Reading the times waits for the device.
+                stages.trace_eye(&frame).and_then(|()| stages.times()).expect("eye");
+                lap[1] = cpu_seconds();
+                stages.trace_photons(&frame).and_then(|()| stages.times()).expect("photons");
+                lap[2] = cpu_seconds();
+                stages.build_index(&frame).and_then(|()| stages.times()).expect("build");
+                lap[3] = cpu_seconds();
+                stages.gather(&frame).and_then(|()| stages.times()).expect("gather");
+                lap[4] = cpu_seconds();
+                stages.accumulate(&frame).expect("accumulate");
+                laps.push([lap[1] - lap[0], lap[2] - lap[1], lap[3] - lap[2], lap[4] - lap[3]]);
             }
+            // The first holds the compilation.
+            let median = |stage: usize| {
+                let mut all: Vec<f64> = laps[1..].iter().map(|lap| lap[stage]).collect();
+                all.sort_by(f64::total_cmp);
+                all[all.len() / 2]
+            };
+            println!(
+                "CPU s: eye {:.2} photons {:.2} build {:.2} gather {:.2}; {} photons",
+                median(0),
+                median(1),
+                median(2),
+                median(3),
+                stages.n_photons()
+            );
         }
     }
 }

@@ -168,8 +168,8 @@ fn brute_force(frame: &Frame, vertex: &EyeVertex, radius: f32, photons: &[Photon
             }
         }
     }
-    for (sum, found) in sum.iter_mut().zip(vertex.radiance) {
-        *sum += f64::from(found);
+    for (sum, radiance) in sum.iter_mut().zip(vertex.radiance) {
+        *sum += f64::from(radiance);
     }
     (sum, doubtful)
 }
