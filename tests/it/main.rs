@@ -6,4 +6,5 @@ mod cli;
 mod gpu;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod layout;
+mod index;
 mod physics;
