@@ -205,8 +205,8 @@ impl<'a> Bsdf<'a> {
             let ab = self.lobe_albedo(if transport == Transport::Radiance { known.z } else { other.z });
             let grazing = (1.0 - cos).powi(5);
             let coat = (self.f0 + (Vec3::splat(self.f90) - self.f0) * grazing) * Self::compensation(self.f0, ab);
-            let metal = (self.base_color + (Vec3::ONE - self.base_color) * grazing)
-                * Self::compensation(self.base_color, ab);
+            let metal =
+                (self.base_color + (Vec3::ONE - self.base_color) * grazing) * Self::compensation(self.base_color, ab);
             return (coat * self.plastic() + metal * self.metallic + self.glass() * through) * lobe;
         }
         // Walter et al. 2007, equation 21.
@@ -331,8 +331,8 @@ impl<'a> Bsdf<'a> {
             return None;
         } else {
             // What is left of the first number decides between coat and glass, then between the glass' two ways.
-            let v = (u[0] - choice.diffuse) / (1.0 - choice.diffuse).max(f32::MIN_POSITIVE)
-                * (choice.coat + choice.glass);
+            let v =
+                (u[0] - choice.diffuse) / (1.0 - choice.diffuse).max(f32::MIN_POSITIVE) * (choice.coat + choice.glass);
             if self.is_smooth() {
                 self.mirror(k, choice, v, transport)?
             } else {

@@ -33,7 +33,8 @@ pub fn gather(
     let normal = oct::decode(vertex.normal);
     let shading_normal = oct::decode(vertex.shading_normal);
     let segments = vertex.flags >> 8 & 0xff;
-    let glossy = (vertex.flags & EYE_GLOSSY != 0).then(|| (Bsdf::of_vertex(scene, vertex), oct::decode(vertex.outgoing)));
+    let glossy =
+        (vertex.flags & EYE_GLOSSY != 0).then(|| (Bsdf::of_vertex(scene, vertex), oct::decode(vertex.outgoing)));
     let both_sides = glossy.is_some() && vertex.transmission > 0.0;
     let constant = frame.flags & FRAME_CONSTANT_KERNEL != 0;
     let inverse_radius2 = 1.0 / (radius * radius);

@@ -264,8 +264,7 @@ pub fn emit(scene: &PackedScene, u: [f32; 3], v: [f32; 3]) -> Option<Emission> {
         LIGHT_SPOT => {
             let local = warp::cone(angle, light.cos_outer);
             let direction = Frame::around(light.direction.into()).world(local);
-            let power = Vec3::from(light.intensity)
-                * (spot(light, direction) * TAU * (1.0 - light.cos_outer) * chosen);
+            let power = Vec3::from(light.intensity) * (spot(light, direction) * TAU * (1.0 - light.cos_outer) * chosen);
             (power.max_element() > 0.0).then(|| Emission { origin: light.position.into(), direction, power })
         }
         LIGHT_DIRECTIONAL => {

@@ -167,12 +167,7 @@ impl Stages for CpuStages {
     }
 
     fn film(&mut self) -> Result<Film, Error> {
-        Ok(Film {
-            width: self.width,
-            height: self.height,
-            n_iterations: self.n_iterations,
-            pixels: self.film.clone(),
-        })
+        Ok(Film { width: self.width, height: self.height, n_iterations: self.n_iterations, pixels: self.film.clone() })
     }
 
     fn n_photons(&self) -> u32 {

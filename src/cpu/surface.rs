@@ -70,11 +70,7 @@ pub fn at(scene: &PackedScene, hit: &Hit, origin: Vec3, direction: Vec3) -> Surf
         roughness,
         metallic,
         transmission,
-        emission: if front || m.flags & MATERIAL_DOUBLE_SIDED != 0 {
-            emission(scene, p, &at)
-        } else {
-            Vec3::ZERO
-        },
+        emission: if front || m.flags & MATERIAL_DOUBLE_SIDED != 0 { emission(scene, p, &at) } else { Vec3::ZERO },
     }
 }
 
@@ -114,9 +110,7 @@ fn shading_normal(
     let m = &scene.materials[p.material as usize];
     let [a, b, c] = p.vertices.map(|i| &scene.vertices[i as usize]);
     let w = 1.0 - hit.u - hit.v;
-    let mix = |a: [f32; 3], b: [f32; 3], c: [f32; 3]| {
-        Vec3::from(a) * w + Vec3::from(b) * hit.u + Vec3::from(c) * hit.v
-    };
+    let mix = |a: [f32; 3], b: [f32; 3], c: [f32; 3]| Vec3::from(a) * w + Vec3::from(b) * hit.u + Vec3::from(c) * hit.v;
     let interpolated = mix(a.normal, b.normal, c.normal).normalize_or(outward);
     let mut n = interpolated;
     if m.normal_slot != NONE {
@@ -129,7 +123,8 @@ fn shading_normal(
             n = frame.world(t).normalize_or(interpolated);
         } else {
             let hand = if p.flags & PRIMITIVE_MIRRORED_UV != 0 { -1.0 } else { 1.0 };
-            n = (along * t.x + interpolated.cross(along) * (hand * t.y) + interpolated * t.z).normalize_or(interpolated);
+            n = (along * t.x + interpolated.cross(along) * (hand * t.y) + interpolated * t.z)
+                .normalize_or(interpolated);
         }
     }
     // A shading normal turned away from the viewer has no lobe to show; fall back step by step.

@@ -260,6 +260,8 @@ impl Points {
 
     fn bounds(&self, n: usize) -> (Vec3, Vec3) {
         let [x, y, z] = self.0.map(|c| c.to_array());
-        (0..n).map(|i| Vec3::new(x[i], y[i], z[i])).fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |a, p| (a.0.min(p), a.1.max(p)))
+        (0..n)
+            .map(|i| Vec3::new(x[i], y[i], z[i]))
+            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |a, p| (a.0.min(p), a.1.max(p)))
     }
 }

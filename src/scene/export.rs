@@ -215,7 +215,8 @@ impl Writer {
         let place = format!("light {index}");
         let intensity = light.intensity.max_element();
         let color = if intensity > 0.0 { light.intensity / intensity } else { Vec3::ONE };
-        let mut value = json!({ "color": numbers(&color.to_array(), &place)?, "intensity": number(intensity, &place)? });
+        let mut value =
+            json!({ "color": numbers(&color.to_array(), &place)?, "intensity": number(intensity, &place)? });
         value["type"] = match light.kind {
             PunctualKind::Point => json!("point"),
             PunctualKind::Directional => json!("directional"),

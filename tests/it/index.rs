@@ -38,8 +38,7 @@ fn assert_same(points: &[Vec3], tree: &PointBvh, centre: Vec3, radius: f32) -> u
 
 #[track_caller]
 fn assert_kth(points: &[Vec3], tree: &PointBvh, centre: Vec3, radius: f32) {
-    let mut all: Vec<f32> =
-        points.iter().map(|&p| distance2(p, centre)).filter(|&d2| d2 <= radius * radius).collect();
+    let mut all: Vec<f32> = points.iter().map(|&p| distance2(p, centre)).filter(|&d2| d2 <= radius * radius).collect();
     all.sort_unstable_by(f32::total_cmp);
     for k in [1, 2, 7, 8, 9, 10, 33, 64] {
         let expected = all.get(k - 1).map(|d| d.to_bits());
@@ -119,7 +118,8 @@ fn shapes() {
     ];
     for (name, shape) in shapes {
         for (scale, offset) in [(1.0, 0.0), (1.0, 1e4), (-1e-12, 0.0), (1e-3, -1e6), (1e15, 0.0)] {
-            let points: Vec<Vec3> = shape.iter().map(|&p| p * scale + Vec3::new(offset, -offset, 0.5 * offset)).collect();
+            let points: Vec<Vec3> =
+                shape.iter().map(|&p| p * scale + Vec3::new(offset, -offset, 0.5 * offset)).collect();
             let tree = PointBvh::new(&points);
             assert_sound(&points, &tree);
             let mut n_found = 0;
@@ -129,7 +129,9 @@ fn shapes() {
                 // A radius that reaches a certain point exactly, or as nearly as its square in f32 does.
                 let reach = at_a_point.distance(points[(q as usize * 91 + 5) % points.len()]);
                 for centre in [at_a_point, beside] {
-                    for radius in [0.0, 1e-3 * scale.abs(), 0.3 * scale.abs(), reach, reach.next_down(), reach.next_up()] {
+                    for radius in
+                        [0.0, 1e-3 * scale.abs(), 0.3 * scale.abs(), reach, reach.next_down(), reach.next_up()]
+                    {
                         n_found += assert_same(&points, &tree, centre, radius.max(0.0));
                     }
                 }
@@ -148,8 +150,11 @@ fn shapes() {
 #[test]
 fn points_on_the_sphere_of_the_query() {
     let (mut inside, mut outside) = (0, 0);
-    for (q, (radius, spread)) in
-        [(1.0, 0.0), (0.1, 1.0), (0.37, 3.0), (1e-3, 1.0), (12.5, 100.0), (1e4, 1e5)].into_iter().cycle().take(120).enumerate()
+    for (q, (radius, spread)) in [(1.0, 0.0), (0.1, 1.0), (0.37, 3.0), (1e-3, 1.0), (12.5, 100.0), (1e4, 1e5)]
+        .into_iter()
+        .cycle()
+        .take(120)
+        .enumerate()
     {
         let centre = cube(4, q as u32) * spread;
         let points: Vec<Vec3> = (0..500)

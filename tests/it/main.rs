@@ -4,7 +4,10 @@
 mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
+mod index;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod layout;
-mod index;
 mod physics;
+#[cfg(feature = "render")]
+mod reference;
+mod sampling;

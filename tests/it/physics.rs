@@ -62,12 +62,7 @@ fn small(n_paths: u32) -> Params {
 }
 
 fn point_light(position: Vec3, intensity: f32) -> PunctualLight {
-    PunctualLight {
-        position,
-        direction: Vec3::NEG_Y,
-        intensity: Vec3::splat(intensity),
-        kind: PunctualKind::Point,
-    }
+    PunctualLight { position, direction: Vec3::NEG_Y, intensity: Vec3::splat(intensity), kind: PunctualKind::Point }
 }
 
 /// Inside a sphere that emits L and reflects ρ, radiance is L/(1 − ρ). The cap of a sphere within a chord r of a point
@@ -95,9 +90,12 @@ fn closed_enclosure_cut_at_a_length() {
     let mut material = Material::diffuse("wall", Vec3::splat(albedo));
     material.emission = Vec3::splat(emission);
     let scene = inside(material);
-    for (depth, direct, roulette) in
-        [(1, Direct::Sampled, true), (2, Direct::Sampled, true), (4, Direct::Sampled, true), (4, Direct::Photons, false)]
-    {
+    for (depth, direct, roulette) in [
+        (1, Direct::Sampled, true),
+        (2, Direct::Sampled, true),
+        (4, Direct::Sampled, true),
+        (4, Direct::Photons, false),
+    ] {
         let expected = emission * (1.0 - albedo.powi(depth as i32)) / (1.0 - albedo);
         let found = over_seeds(10, |seed| {
             let params = Params { seed, direct, roulette, max_segments: depth, ..small(20_000) };
@@ -119,9 +117,8 @@ fn point_light_in_a_sphere() {
     scene.lights.push(point_light(Vec3::ZERO, 3.0));
     let expected = f64::from(albedo * 3.0 / (PI * 4.0 * (1.0 - albedo)));
     for direct in [Direct::Sampled, Direct::Photons] {
-        let found = over_seeds(10, |seed| {
-            mean(&render(&scene, &off_centre(), &Params { seed, direct, ..small(30_000) }, 4))
-        });
+        let found =
+            over_seeds(10, |seed| mean(&render(&scene, &off_centre(), &Params { seed, direct, ..small(30_000) }, 4)));
         assert_close(found, expected, 3e-3);
     }
 }
@@ -255,10 +252,8 @@ fn error_falls_at_the_rate_of_knaus_and_zwicker() {
 /// Every material of albedo 1 disappears in uniform light.
 #[test]
 fn white_furnace() {
-    let white =
-        |metallic, roughness, specular| Material { metallic, roughness, specular, ..Material::default() };
-    let glass =
-        |roughness, volume| Material { roughness, transmission: 1.0, volume, ..Material::default() };
+    let white = |metallic, roughness, specular| Material { metallic, roughness, specular, ..Material::default() };
+    let glass = |roughness, volume| Material { roughness, transmission: 1.0, volume, ..Material::default() };
     // (material, energy that single scattering may lose)
     let mut cases = vec![(white(0.0, 1.0, 0.0), 0.0), (glass(0.0, true), 0.0), (glass(0.0, false), 0.0)];
     for roughness in [0.0, 0.1, 0.25, 0.4, 0.7, 1.0] {
@@ -284,8 +279,10 @@ fn white_furnace() {
             mean(&render(&scene, &camera, &params, 8))
         });
         let off = found - 1.0;
-        let name =
-            format!("metallic {} roughness {} transmission {}", material.metallic, material.roughness, material.transmission);
+        let name = format!(
+            "metallic {} roughness {} transmission {}",
+            material.metallic, material.roughness, material.transmission
+        );
         eprintln!("{name}: {off:+.4} ± {error:.4}");
         assert!(off < 3.0 * error + 2e-3, "{name} glows: {found} ± {error}");
         assert!(off > -3.0 * error - 3e-3 - may_lose, "{name} darkens: {found} ± {error}");
@@ -364,12 +361,8 @@ fn flux_is_balanced() {
 fn lights_emit_their_power() {
     let pi = std::f64::consts::PI;
     let (inner, outer) = (0.3f32, 0.6f32);
-    let light = |kind| PunctualLight {
-        position: Vec3::ZERO,
-        direction: Vec3::new(0.6, -0.8, 0.0),
-        intensity: Vec3::ONE,
-        kind,
-    };
+    let light =
+        |kind| PunctualLight { position: Vec3::ZERO, direction: Vec3::new(0.6, -0.8, 0.0), intensity: Vec3::ONE, kind };
     let ball = |material, lights: Vec<PunctualLight>, environment: Option<Environment>| Scene {
         spheres: vec![Sphere { centre: Vec3::ZERO, radius: 0.5, inward: false, material: 0 }],
         materials: vec![material],

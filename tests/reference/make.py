@@ -167,8 +167,8 @@ def make(mi, name, renders, spp):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", help="all scenes if none is named")
-    parser.add_argument("--renders", type=int, default=32)
-    parser.add_argument("--spp", type=int, default=256)
+    parser.add_argument("--renders", type=int, default=64)
+    parser.add_argument("--spp", type=int, default=192)
     parser.add_argument("--variant", default="llvm_ad_rgb", help="or scalar_rgb, which needs no LLVM")
     arguments = parser.parse_args()
     import mitsuba as mi

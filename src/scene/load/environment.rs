@@ -84,11 +84,12 @@ fn read_exr(bytes: &[u8]) -> Result<Downsampled, String> {
         }
     }
     let create = |size: exr::math::Vec2<usize>, _: &_| Downsampled::new(size.0, size.1);
-    let set = |map: &mut Result<Downsampled, String>, at: exr::math::Vec2<usize>, (r, g, b, _): (f32, f32, f32, f32)| {
-        if let Ok(map) = map {
-            map.add(at.0, at.1, [r, g, b]);
-        }
-    };
+    let set =
+        |map: &mut Result<Downsampled, String>, at: exr::math::Vec2<usize>, (r, g, b, _): (f32, f32, f32, f32)| {
+            if let Ok(map) = map {
+                map.add(at.0, at.1, [r, g, b]);
+            }
+        };
     let image = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()

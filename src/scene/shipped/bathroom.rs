@@ -118,7 +118,10 @@ fn vanity(b: &mut Builder, chrome: usize, ceramic: usize) {
     let mut doors = Shape::default();
     for k in 0..4 {
         let x = -0.70 + 0.35 * k as f32;
-        doors.append(Shape::cuboid(Vec3::new(x + 0.004, 0.166, front - 0.002), Vec3::new(x + 0.346, 0.768, front + 0.018)));
+        doors.append(Shape::cuboid(
+            Vec3::new(x + 0.004, 0.166, front - 0.002),
+            Vec3::new(x + 0.346, 0.768, front + 0.018),
+        ));
     }
     b.add("doors", doors, oak);
     let mut pulls = Shape::default();
@@ -149,7 +152,8 @@ fn vanity(b: &mut Builder, chrome: usize, ceramic: usize) {
         .curve([0.200, 0.06], [0.16, 0.028], [0.024, 0.022], 22)
         .to(0.0, 0.0215);
     b.add("basin", basin.lathe(128).moved(place), ceramic);
-    let plug = Profile::start(0.026, 0.020).to(0.026, 0.0255).crease().curve([0.026, 0.028], [0.01, 0.029], [0.0, 0.029], 8);
+    let plug =
+        Profile::start(0.026, 0.020).to(0.026, 0.0255).crease().curve([0.026, 0.028], [0.01, 0.029], [0.0, 0.029], 8);
     b.add("plug", plug.lathe(48).moved(place), chrome);
 
     let root = Vec3::new(0.0, 0.814, back + 0.036);
@@ -279,7 +283,12 @@ fn lamp(b: &mut Builder, centre: Vec3, glass: usize, filament: usize, chrome: us
         Vec3::new(centre.x, centre.y + 0.150, wall + 0.005),
     ];
     arm.append(Shape::tube(&spline(&path, 10), |_| 0.008, 24));
-    let plate = Profile::start(0.0, 0.0).to(0.045, 0.0).to(0.045, 0.010).crease().curve([0.044, 0.018], [0.02, 0.02], [0.0, 0.02], 10);
+    let plate = Profile::start(0.0, 0.0).to(0.045, 0.0).to(0.045, 0.010).crease().curve(
+        [0.044, 0.018],
+        [0.02, 0.02],
+        [0.0, 0.02],
+        10,
+    );
     let upright = Quat::from_rotation_x(PI / 2.0);
     let pose = Affine3A::from_rotation_translation(upright, Vec3::new(centre.x, centre.y + 0.150, wall - 0.001));
     arm.append(plate.lathe(64).transformed(pose));
@@ -367,8 +376,8 @@ fn tub(b: &mut Builder, ceramic: usize, chrome: usize) {
         .curve([0.885, 0.60], [0.87, 0.57], [0.85, 0.50], 10)
         .curve([0.80, 0.22], [0.72, 0.11], [0.45, 0.10], 22)
         .to(0.0, 0.09);
-    let scale = Affine3A::from_translation(Vec3::new(1.08, 0.003, -0.02))
-        * Affine3A::from_scale(Vec3::new(0.42, 1.0, 0.92));
+    let scale =
+        Affine3A::from_translation(Vec3::new(1.08, 0.003, -0.02)) * Affine3A::from_scale(Vec3::new(0.42, 1.0, 0.92));
     b.add("tub", tub.lathe(160).transformed(scale), ceramic);
     let root = Vec3::new(1.08, 0.0, -1.10);
     let path = [

@@ -99,9 +99,10 @@ fn chimney(b: &mut Builder) {
         seed: 4,
     };
     let lay = |faces: &[(Vec3, Vec3, Vec3)]| {
-        let parts = faces.iter().enumerate().map(|(k, &(corner, u, v))| {
-            Tiling { seed: 40 + k as u32, ..tiling }.over(corner, u, v, |_| true)
-        });
+        let parts = faces
+            .iter()
+            .enumerate()
+            .map(|(k, &(corner, u, v))| Tiling { seed: 40 + k as u32, ..tiling }.over(corner, u, v, |_| true));
         Shape::union(parts)
     };
     b.add("bricks", lay(&faces), brick);
@@ -141,9 +142,12 @@ fn candles(b: &mut Builder) {
         .crease()
         .to(0.0, 0.142);
     let candle = Profile::start(0.0, -0.001).to(0.011, -0.001).crease().to(0.011, 0.13).crease().to(0.0, 0.128);
-    let tongue = Profile::start(0.0, 0.0)
-        .curve([0.006, 0.0], [0.008, 0.010], [0.0052, 0.018], 6)
-        .curve([0.0035, 0.024], [0.0015, 0.030], [0.0, 0.036], 5);
+    let tongue = Profile::start(0.0, 0.0).curve([0.006, 0.0], [0.008, 0.010], [0.0052, 0.018], 6).curve(
+        [0.0035, 0.024],
+        [0.0015, 0.030],
+        [0.0, 0.036],
+        5,
+    );
     for (k, x) in [-0.80, -0.62, 0.86].into_iter().enumerate() {
         let at = Vec3::new(x, 1.234, BREAST + 0.10 + 0.03 * (k as f32 - 1.0).abs());
         b.add("candlestick", stick.lathe(48).moved(at), brass);
@@ -222,7 +226,13 @@ fn fire(b: &mut Builder) {
         let reach = 0.34 * (1.0 - u.abs()).powf(0.8) + 0.05;
         let t = random.unit() * random.unit().max(0.3);
         let from = Vec3::new(x * (1.0 - 0.5 * t), base + 0.10 + reach * t, z + dz * (1.0 - 0.6 * t));
-        let hue = if t < 0.18 { 0 } else if t < 0.5 { 1 } else { 2 };
+        let hue = if t < 0.18 {
+            0
+        } else if t < 0.5 {
+            1
+        } else {
+            2
+        };
         let length = random.between(0.045, 0.11) * (1.0 - 0.45 * t);
         let width = length * random.between(0.13, 0.22);
         let sway = Vec3::new(random.between(-0.35, 0.35) - 0.4 * u, 1.0, random.between(-0.3, 0.3)).normalize();
@@ -241,10 +251,7 @@ fn tongue(from: Vec3, along: Vec3, width: f32, turn: f32) -> Shape {
         from,
     );
     let length = along.length();
-    let profile = Profile::start(0.0, 0.0)
-        .to(width, 0.28 * length)
-        .to(0.6 * width, 0.60 * length)
-        .to(0.0, length);
+    let profile = Profile::start(0.0, 0.0).to(width, 0.28 * length).to(0.6 * width, 0.60 * length).to(0.0, length);
     profile.lathe(5).transformed(pose)
 }
 
@@ -283,7 +290,12 @@ fn fender(b: &mut Builder) {
     // A log basket would hide the fire; irons in a stand do not.
     let mut irons = Shape::default();
     let at = Vec3::new(-1.02, HEARTH - 0.001, BREAST + 0.24);
-    let foot = Profile::start(0.0, 0.0).to(0.085, 0.0).crease().to(0.085, 0.010).crease().curve([0.05, 0.02], [0.012, 0.02], [0.010, 0.05], 10);
+    let foot = Profile::start(0.0, 0.0).to(0.085, 0.0).crease().to(0.085, 0.010).crease().curve(
+        [0.05, 0.02],
+        [0.012, 0.02],
+        [0.010, 0.05],
+        10,
+    );
     irons.append(foot.to(0.010, 0.60).crease().to(0.0, 0.60).lathe(40).moved(at));
     irons.append(Shape::icosphere(at + Vec3::Y * 0.615, 0.022, 3));
     irons.append(Shape::torus(at + Vec3::Y * 0.50, 0.055, 0.005, 48, 12));
@@ -312,7 +324,9 @@ fn seats(b: &mut Builder) {
     for (k, (z, turn, color)) in [(-1.32, 0.35, 0xC8893B), (0.0, -0.25, 0xA23B30)].into_iter().enumerate() {
         let cloth = b.material(Material::diffuse(&format!("cushion {k}"), srgb(color)));
         let pose = Affine3A::from_rotation_translation(
-            Quat::from_rotation_y(std::f32::consts::FRAC_PI_2) * Quat::from_rotation_z(turn * 0.3) * Quat::from_rotation_x(1.20),
+            Quat::from_rotation_y(std::f32::consts::FRAC_PI_2)
+                * Quat::from_rotation_z(turn * 0.3)
+                * Quat::from_rotation_x(1.20),
             Vec3::new(-1.66, 0.66, z),
         );
         let pillow = furniture::cushion(Vec3::new(0.42, 0.09, 0.40), 0.035, 0.045);

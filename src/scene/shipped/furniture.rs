@@ -117,7 +117,8 @@ pub fn books(length: f32, tallest: f32, colors: &[Vec3], seed: u32) -> Shape {
         let color = colors[(random.unit() * colors.len() as f32) as usize % colors.len()];
         let lean = if random.unit() < 0.08 { -0.10 } else { 0.0 };
         let book = Shape::rounded_cuboid(Vec3::new(0.0, -0.001, -depth), Vec3::new(width, height, 0.0), 0.004, 2);
-        let pose = Affine3A::from_rotation_translation(Quat::from_rotation_z(lean), Vec3::new(x, 0.0, -random.unit() * 0.02));
+        let pose =
+            Affine3A::from_rotation_translation(Quat::from_rotation_z(lean), Vec3::new(x, 0.0, -random.unit() * 0.02));
         shape.append(book.transformed(pose).colored(color * random.between(0.8, 1.1)));
         x += width + 0.0015 - lean * height;
     }
@@ -138,7 +139,8 @@ pub fn curtain(size: Vec2, folds: usize, seed: u32) -> Shape {
 /// A log from `from` to `to` with rough bark.
 pub fn log(from: Vec3, to: Vec3, radius: f32, seed: u32) -> Shape {
     let mut random = Random::new(seed);
-    let sag = Vec3::new(random.between(-1.0, 1.0), random.between(-0.4, 0.4), random.between(-1.0, 1.0)) * (0.12 * radius);
+    let sag =
+        Vec3::new(random.between(-1.0, 1.0), random.between(-0.4, 0.4), random.between(-1.0, 1.0)) * (0.12 * radius);
     let path = spline(&[from, from.lerp(to, 0.35) + sag, from.lerp(to, 0.7) - 0.5 * sag, to], 14);
     let mut shape = Shape::tube(&path, |_| radius, 40);
     let sides = 40;

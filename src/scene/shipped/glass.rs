@@ -45,9 +45,12 @@ impl Goblet {
         let inside = outside.curve([0.0340, 0.1960], [0.0405, 0.1800], [0.0415, 0.1560], 18);
         let rim_of_wine = inside.last_index();
         let rim = inside.last();
-        let all = inside
-            .curve([0.0418, 0.1480], [0.0417, 0.1390], [0.0404, 0.1320], 8)
-            .curve([0.0368, 0.1120], [0.0190, 0.0975], [0.0, 0.0968], 26);
+        let all = inside.curve([0.0418, 0.1480], [0.0417, 0.1390], [0.0404, 0.1320], 8).curve(
+            [0.0368, 0.1120],
+            [0.0190, 0.0975],
+            [0.0, 0.0968],
+            26,
+        );
         let plain = |_| (1.0, 0.0);
         // The wine climbs the wall by a millimetre and a half. From wall to axis: the air is above.
         let level = |d: f32| rim.y - 0.0015 * (1.0 - (-d / 0.0016).exp());

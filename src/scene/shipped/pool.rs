@@ -241,7 +241,8 @@ fn things(b: &mut Builder) {
         .to(0.0, 0.40)
         .lathe(64);
     let leaf = b.material(glossy("leaf", srgb(0x3E7A35), 0.45));
-    for (k, place) in [Vec3::new(-3.9, TERRACE - 0.01, -2.85), Vec3::new(0.6, TERRACE - 0.01, -3.0)].into_iter().enumerate()
+    for (k, place) in
+        [Vec3::new(-3.9, TERRACE - 0.01, -2.85), Vec3::new(0.6, TERRACE - 0.01, -3.0)].into_iter().enumerate()
     {
         b.add(&format!("pot {k}"), pot.clone().moved(place), clay);
         b.add(&format!("plant {k}"), plant(17 + k as u32).moved(place + Vec3::Y * 0.395), leaf);

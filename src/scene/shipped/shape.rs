@@ -42,9 +42,7 @@ impl Shape {
         let d = max - min;
         let (x, y, z) = (Vec3::X * d.x, Vec3::Y * d.y, Vec3::Z * d.z);
         let mut shape = Self::quad(min + z, x, y);
-        for (corner, u, v) in
-            [(min + x + z, -z, y), (min + x, -x, y), (min, z, y), (min + y + z, x, -z), (min, x, z)]
-        {
+        for (corner, u, v) in [(min + x + z, -z, y), (min + x, -x, y), (min, z, y), (min + y + z, x, -z), (min, x, z)] {
             shape.append(Self::quad(corner, u, v));
         }
         shape
