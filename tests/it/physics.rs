@@ -476,3 +476,25 @@ fn the_unit_of_length_does_not_matter() {
         assert!((other / metre - 1.0).abs() < 0.02, "{other} at {s}, {metre} at 1");
     }
 }
+
+/// A small white ball in the middle of a round lamp, all in an absorbing fluid that does not refract: light crosses the
+/// lamp's radius and then the depth of the ball, L = L_e·exp(−σ(R + d)), whether the lamp is sampled or found.
+#[test]
+fn lamps_inside_a_medium_are_absorbed() {
+    let (sigma, depth) = (0.4f32, 1.5f32);
+    let fluid = Material { absorption: Vec3::splat(sigma), ..Material::glass("fluid", 1.0) };
+    for surface in [Material::metal("", Vec3::ONE, 0.5), Material::diffuse("", Vec3::ONE)] {
+        let scene = Scene {
+            spheres: vec![
+                Sphere { centre: Vec3::ZERO, radius: depth, inward: false, material: 0 },
+                Sphere { centre: Vec3::ZERO, radius: 1.0, inward: true, material: 1 },
+                Sphere { centre: Vec3::ZERO, radius: 2e-3, inward: false, material: 2 },
+            ],
+            materials: vec![fluid.clone(), Material::emitter("lamp", Vec3::ONE), surface],
+            ..Scene::default()
+        };
+        let camera = Camera::look_at("", Vec3::new(0.0, 0.0, 4.0), Vec3::ZERO, Vec3::Y, 5e-4);
+        let found = over_seeds(6, |seed| mean(&render(&scene, &camera, &Params { seed, ..small(10) }, 8)));
+        assert_close(found, f64::from((-sigma * (1.0 + depth)).exp()), 2e-2);
+    }
+}

@@ -241,7 +241,7 @@ fn room() {
 /// Diffuse things on the ground under a turned sky with a small sun, and light from one direction.
 #[test]
 fn sky() {
-    assert_agrees("sky", 0.012, 160_000, 8);
+    assert_agrees("sky", 0.012, 50_000, 24);
 }
 
 /// A ball and a block of coloured absorbing glass.
