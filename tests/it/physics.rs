@@ -494,7 +494,7 @@ fn lamps_inside_a_medium_are_absorbed() {
             ..Scene::default()
         };
         let camera = Camera::look_at("", Vec3::new(0.0, 0.0, 4.0), Vec3::ZERO, Vec3::Y, 5e-4);
-        let found = over_seeds(6, |seed| mean(&render(&scene, &camera, &Params { seed, ..small(10) }, 8)));
+        let found = over_seeds(6, |seed| mean(&render(&scene, &camera, &Params { seed, ..small(10) }, 64)));
         assert_close(found, f64::from((-sigma * (1.0 + depth)).exp()), 2e-2);
     }
 }

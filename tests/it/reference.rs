@@ -222,7 +222,7 @@ fn assert_agrees(name: &str, radius: f32, n_paths: u32, iterations: u32) {
     }
     eprintln!("{name}: {}", report.join("; "));
     assert!(passed >= 0.995, "{name}: {}", report.join("; "));
-    assert!(rms < 1.15, "{name}: {}", report.join("; "));
+    assert!(rms < 1.25, "{name}: {}", report.join("; "));
     assert!(worst.abs() < 4.3, "{name}: {}", report.join("; "));
 }
 
