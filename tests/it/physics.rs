@@ -261,8 +261,9 @@ fn white_furnace() {
             cases.push((white(metallic, roughness, 1.0), 0.0));
         }
     }
-    // Rough glass is not compensated: it darkens by what is reflected twice between its microfacets.
-    cases.extend([(glass(0.2, true), 0.01), (glass(0.5, true), 0.08), (glass(0.5, false), 0.08)]);
+    // Rough glass is not compensated: it darkens by what is reflected twice between its microfacets. Another renderer's
+    // solid ball of this roughness keeps 0.817; a few lines of NumPy say 0.792 of the thin one.
+    cases.extend([(glass(0.2, true), 0.01), (glass(0.5, true), 0.19), (glass(0.5, false), 0.21)]);
     cases.push((Material { transmission: 0.5, roughness: 0.0, volume: true, ..Material::default() }, 0.0));
     for (material, may_lose) in cases {
         let scene = Scene {
@@ -286,7 +287,7 @@ fn white_furnace() {
         eprintln!("{name}: {off:+.4} ± {error:.4}");
         assert!(off < 3.0 * error + 2e-3, "{name} glows: {found} ± {error}");
         assert!(off > -3.0 * error - 3e-3 - may_lose, "{name} darkens: {found} ± {error}");
-        assert!(error < 4e-3, "{name}: {error}");
+        assert!(error < if may_lose > 0.0 { 1e-2 } else { 4e-3 }, "{name}: {error}");
     }
 }
 
