@@ -6,6 +6,7 @@ mod backends;
 mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
+mod index;
 mod layering;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod layout;
@@ -13,3 +14,7 @@ mod layout;
 mod loading;
 #[cfg(feature = "render")]
 mod physics;
+#[cfg(feature = "render")]
+mod reference;
+#[cfg(feature = "render")]
+mod sampling;

@@ -261,8 +261,9 @@ fn white_furnace() {
             cases.push((white(metallic, roughness, 1.0), 0.0));
         }
     }
-    // Rough glass is not compensated: it darkens by what is reflected twice between its microfacets.
-    cases.extend([(glass(0.2, true), 0.01), (glass(0.5, true), 0.08), (glass(0.5, false), 0.08)]);
+    // Rough glass is not compensated: it darkens by what is reflected twice between its microfacets. Another renderer's
+    // solid ball of this roughness keeps 0.817; a few lines of NumPy say 0.792 of the thin one.
+    cases.extend([(glass(0.2, true), 0.01), (glass(0.5, true), 0.19), (glass(0.5, false), 0.21)]);
     cases.push((Material { transmission: 0.5, roughness: 0.0, volume: true, ..Material::default() }, 0.0));
     for (material, may_lose) in cases {
         let scene = Scene {
@@ -286,7 +287,7 @@ fn white_furnace() {
         eprintln!("{name}: {off:+.4} ± {error:.4}");
         assert!(off < 3.0 * error + 2e-3, "{name} glows: {found} ± {error}");
         assert!(off > -3.0 * error - 3e-3 - may_lose, "{name} darkens: {found} ± {error}");
-        assert!(error < 4e-3, "{name}: {error}");
+        assert!(error < if may_lose > 0.0 { 1e-2 } else { 4e-3 }, "{name}: {error}");
     }
 }
 
@@ -474,5 +475,27 @@ fn the_unit_of_length_does_not_matter() {
     for s in [1e-3, 1e3] {
         let other = scaled(s);
         assert!((other / metre - 1.0).abs() < 0.02, "{other} at {s}, {metre} at 1");
+    }
+}
+
+/// A small white ball in the middle of a round lamp, all in an absorbing fluid that does not refract: light crosses the
+/// lamp's radius and then the depth of the ball, L = L_e·exp(−σ(R + d)), whether the lamp is sampled or found.
+#[test]
+fn lamps_inside_a_medium_are_absorbed() {
+    let (sigma, depth) = (0.4f32, 1.5f32);
+    let fluid = Material { absorption: Vec3::splat(sigma), ..Material::glass("fluid", 1.0) };
+    for surface in [Material::metal("", Vec3::ONE, 0.5), Material::diffuse("", Vec3::ONE)] {
+        let scene = Scene {
+            spheres: vec![
+                Sphere { centre: Vec3::ZERO, radius: depth, inward: false, material: 0 },
+                Sphere { centre: Vec3::ZERO, radius: 1.0, inward: true, material: 1 },
+                Sphere { centre: Vec3::ZERO, radius: 2e-3, inward: false, material: 2 },
+            ],
+            materials: vec![fluid.clone(), Material::emitter("lamp", Vec3::ONE), surface],
+            ..Scene::default()
+        };
+        let camera = Camera::look_at("", Vec3::new(0.0, 0.0, 4.0), Vec3::ZERO, Vec3::Y, 5e-4);
+        let found = over_seeds(6, |seed| mean(&render(&scene, &camera, &Params { seed, ..small(10) }, 64)));
+        assert_close(found, f64::from((-sigma * (1.0 + depth)).exp()), 2e-2);
     }
 }
