@@ -164,7 +164,9 @@ impl Context {
         let Some((info, adapter)) = found.into_iter().find(|(info, _)| wanted(info)) else {
             return Err(Error::NoDevice(match choice {
                 Choice::Real => format!("no hardware GPU; {}", list()),
-                Choice::Any => "no GPU adapter: no driver, or none with compute shaders".to_owned(),
+                Choice::Any => {
+                    "no GPU adapter: no driver, or none with compute shaders (--backend cpu needs none)".to_owned()
+                }
                 Choice::Index(index) => format!("no GPU adapter {index}; {}", list()),
                 Choice::Name(part) => format!("no GPU adapter named \"{part}\"; {}", list()),
             }));

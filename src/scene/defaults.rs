@@ -1,6 +1,6 @@
 //! A light and a camera for scenes that bring none.
 
-use super::{Camera, Environment, Scene};
+use super::{Camera, Environment, Material, Scene};
 use glam::Vec3;
 
 /// Texels of the default sky's height; its width is twice that.
@@ -11,17 +11,28 @@ pub fn add_default_light(scene: &mut Scene) -> Option<String> {
     if has_light(scene) {
         return None;
     }
+    let warning = match used_materials(scene).any(|material| material.emission != Vec3::ZERO) {
+        true => "nothing in the scene gives light but painted glow: a soft sky is added",
+        false => "nothing in the scene gives light: a soft sky is added",
+    };
     scene.environment = Some(default_sky());
-    Some("nothing in the scene gives light: a soft sky is added".into())
+    Some(warning.into())
 }
 
-/// Whether an emissive material is in use, or there is a light or an environment, however dim.
+/// Whether a lamp is in use, or there is a light or an environment, however dim.
+///
+/// An emission texture of strength 1 at most is no lamp: it paints the displays and status lights of a model that is
+/// meant to be lit by something else.
 pub fn has_light(scene: &Scene) -> bool {
-    let emits = |material: usize| scene.materials.get(material).is_some_and(|m| m.emission != Vec3::ZERO);
-    !scene.lights.is_empty()
-        || scene.environment.is_some()
-        || scene.meshes.iter().any(|mesh| !mesh.triangles.is_empty() && emits(mesh.material))
-        || scene.spheres.iter().any(|sphere| emits(sphere.material))
+    let is_lamp =
+        |m: &Material| m.emission != Vec3::ZERO && (m.emission_texture.is_none() || m.emission.max_element() > 1.0);
+    !scene.lights.is_empty() || scene.environment.is_some() || used_materials(scene).any(is_lamp)
+}
+
+fn used_materials(scene: &Scene) -> impl Iterator<Item = &Material> {
+    let of_meshes = scene.meshes.iter().filter(|mesh| !mesh.triangles.is_empty()).map(|mesh| mesh.material);
+    let of_spheres = scene.spheres.iter().map(|sphere| sphere.material);
+    of_meshes.chain(of_spheres).filter_map(|material| scene.materials.get(material))
 }
 
 /// A gradient from a dim ground to a pale horizon to a bluish zenith, and one broad bright region high on the left of
@@ -51,31 +62,56 @@ fn smoothstep(t: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// A camera that has the whole scene in view, in pictures at least as wide as high: a little from the right, a little
-/// from above. Rooms made of one inward sphere do not count as long as there is something else.
+/// A camera that has the whole scene in view, in pictures at least as wide as high, and as near as that lets it: a
+/// little from the right, a little from above. Rooms made of one inward sphere do not count as long as there is
+/// something else.
 pub fn default_camera(scene: &Scene) -> Camera {
     const YFOV: f32 = 40_f32.to_radians();
+    /// Half the field of view that is filled: a little air is left around the scene.
+    const FILLED: f32 = 0.93 * 0.5 * YFOV;
     let (azimuth, elevation) = (30_f32.to_radians(), 20_f32.to_radians());
-    let (centre, radius) = bounding_sphere(scene, false).or_else(|| bounding_sphere(scene, true)).unwrap_or_default();
+    let outside = bounding_sphere(scene, false);
+    let with_inward = outside.is_none();
+    let (centre, radius) = outside.or_else(|| bounding_sphere(scene, true)).unwrap_or_default();
     let radius = if radius > 0.0 { radius } else { 1.0 };
     let (sin, cos) = azimuth.sin_cos();
     let towards = Vec3::new(sin * elevation.cos(), elevation.sin(), cos * elevation.cos());
-    // The sphere touches the frustum's sides at this distance; a little air around it.
-    let distance = 1.05 * radius / (0.5 * YFOV).sin();
-    Camera::look_at("default", centre + towards * distance, centre, Vec3::Y, YFOV)
+    let right = Vec3::Y.cross(towards).normalize();
+    let up = towards.cross(right);
+    // A point stays inside a side of the frustum if distance·tan ≥ depth·tan ± (offset along the axis); the two sides of
+    // an axis together give the distance, and what differs between them is where the middle of the picture should be.
+    let (tan, secant) = (FILLED.tan(), 1.0 / FILLED.cos());
+
+    let mut sides = [f32::NEG_INFINITY; 4];
+    for (p, radius) in points(scene, with_inward) {
+        let q = p - centre;
+        let base = q.dot(towards) * tan + radius * secant;
+        let (x, y) = (q.dot(right), q.dot(up));
+        for (side, offset) in sides.iter_mut().zip([x, -x, y, -y]) {
+            *side = side.max(base + offset);
+        }
+    }
+    let [right_side, left_side, top, bottom] = if sides[0].is_finite() { sides } else { [radius; 4] };
+    // A speck has no size of its own.
+    let distance = ((right_side + left_side).max(top + bottom) * 0.5 / tan).max(1e-3 * radius);
+    let target = centre + right * (0.5 * (right_side - left_side)) + up * (0.5 * (top - bottom));
+    Camera::look_at("default", target + towards * distance, target, Vec3::Y, YFOV)
+}
+
+/// Vertices, and spheres with their radii. Only vertices in use: files carry stray ones.
+fn points(scene: &Scene, with_inward: bool) -> impl Iterator<Item = (Vec3, f32)> {
+    let vertices = scene
+        .meshes
+        .iter()
+        .flat_map(|mesh| mesh.triangles.iter().flatten().filter_map(move |&i| mesh.positions.get(i as usize).copied()));
+    let spheres = scene.spheres.iter().filter(move |sphere| with_inward || !sphere.inward);
+    vertices.map(|p| (p, 0.0)).chain(spheres.map(|s| (s.centre, s.radius)))
 }
 
 /// Centre of the bounding box of everything and the radius that reaches every point.
 fn bounding_sphere(scene: &Scene, with_inward: bool) -> Option<(Vec3, f32)> {
-    let spheres = || scene.spheres.iter().filter(|sphere| with_inward || !sphere.inward);
-    // Only vertices in use: files carry stray ones.
-    let vertices = || {
-        scene.meshes.iter().flat_map(|mesh| {
-            mesh.triangles.iter().flatten().filter_map(move |&i| mesh.positions.get(i as usize).copied())
-        })
-    };
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for (p, radius) in vertices().map(|p| (p, 0.0)).chain(spheres().map(|s| (s.centre, s.radius))) {
+    for (p, radius) in points(scene, with_inward) {
         low = low.min(p - radius);
         high = high.max(p + radius);
     }
@@ -83,17 +119,14 @@ fn bounding_sphere(scene: &Scene, with_inward: bool) -> Option<(Vec3, f32)> {
         return None;
     }
     let centre = 0.5 * (low + high);
-    let reach = vertices()
-        .map(|p| p.distance(centre))
-        .chain(spheres().map(|s| s.centre.distance(centre) + s.radius))
-        .fold(0.0, f32::max);
+    let reach = points(scene, with_inward).map(|(p, radius)| p.distance(centre) + radius).fold(0.0, f32::max);
     Some((centre, reach))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Material, Mesh, Projection, Sphere};
+    use crate::scene::{Mesh, Projection, Sphere, Texture};
 
     #[test]
     fn the_camera_sees_every_vertex() {
@@ -106,10 +139,14 @@ mod tests {
         let camera = default_camera(&scene);
         let Projection::Perspective { yfov } = camera.projection else { panic!("a perspective camera") };
         let inverse = camera.world_from_camera.inverse();
+        let mut widest = 0.0;
         for &p in &scene.meshes[0].positions {
             let [x, y, z] = inverse.transform_point3(p).to_array();
             assert!(z < 0.0 && x.abs().max(y.abs()) <= -z * (0.5 * yfov).tan(), "{p}");
+            widest = f32::max(widest, x.abs() / (-z * (0.5 * yfov).tan()));
         }
+        // And it comes near: the scene is wider than high.
+        assert!(widest > 0.9, "{widest}");
         assert!(camera.focus_distance < 20.0);
     }
 
@@ -121,6 +158,12 @@ mod tests {
         let mut lit = dark.clone();
         lit.meshes[0].material = 1;
         assert!(add_default_light(&mut lit).is_none() && lit.environment.is_none());
+        // A glowing display is no lamp, unless it is brighter than what a texture can hold.
+        let mut display = lit.clone();
+        display.materials[1].emission_texture = Some(Texture::new(0));
+        assert!(!has_light(&display));
+        display.materials[1].emission *= 2.0;
+        assert!(has_light(&display));
         assert!(add_default_light(&mut dark).is_some());
         assert_eq!(dark.check(), Ok(()));
         assert!(add_default_light(&mut dark).is_none());

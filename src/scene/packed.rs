@@ -107,7 +107,7 @@ impl PackedScene {
                 emission: m.emission.to_array(),
                 alpha_cutoff: match m.alpha {
                     AlphaMode::Opaque => -1.0,
-                    AlphaMode::Mask(cutoff) => cutoff.clamp(0.0, 1.0),
+                    AlphaMode::Mask(cutoff) => cutoff.min(1.0),
                     AlphaMode::Blend => 2.0,
                 },
                 absorption: m.absorption.to_array(),
@@ -134,6 +134,10 @@ impl PackedScene {
         let mut primitives = Vec::new();
         for mesh in &scene.meshes {
             let material = &scene.materials[mesh.material];
+            // No opacity reaches such a cut-off: glTF has the mesh vanish.
+            if matches!(material.alpha, AlphaMode::Mask(cutoff) if cutoff > 1.0) {
+                continue;
+            }
             let first = self.vertices.len() as u32;
             let tangents = mesh_tangents(mesh, material.normal_texture.as_ref());
             let no_normals = mesh.normals.is_empty();
@@ -384,4 +388,21 @@ fn mesh_tangents(mesh: &super::Mesh, map: Option<&Texture>) -> Vec<Vec4> {
         t.extend(handedness)
     };
     (0..mesh.positions.len()).map(tangent).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Material, Mesh};
+
+    #[test]
+    fn an_alpha_cutoff_above_one_hides_the_mesh() {
+        let mesh =
+            Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]], ..Mesh::default() };
+        let masked = |cutoff| Material { alpha: AlphaMode::Mask(cutoff), ..Material::default() };
+        let materials = vec![masked(1.0), masked(1.5)];
+        let scene = Scene { meshes: vec![mesh.clone(), Mesh { material: 1, ..mesh }], materials, ..Scene::default() };
+        let packed = PackedScene::new(&scene);
+        assert_eq!(packed.primitives.iter().map(|p| p.material).collect::<Vec<_>>(), [0]);
+    }
 }

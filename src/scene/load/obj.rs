@@ -303,6 +303,11 @@ impl<'a> Parser<'a> {
                 let color = |corner: &Corner| -> Vec4 { self.colors[corner.0 as usize].extend(1.0) };
                 mesh.colors = corners.iter().map(color).collect();
             }
+            // In the file's own numbering, before `clean` finds it in the mesh's.
+            if let Some(corner) = corners.iter().find(|corner| !self.positions[corner.0 as usize].is_finite()) {
+                let n = corner.0 + 1;
+                return Err(self.source.invalid(format!("vertex {n}"), "is not finite"));
+            }
             geometry::clean(&mut mesh, &place, self.warnings).map_err(|problem| self.source.invalid(place, problem))?;
             if !mesh.triangles.is_empty() {
                 scene.meshes.push(mesh);

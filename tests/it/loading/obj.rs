@@ -46,7 +46,7 @@ fn wrong_lines_are_named() {
     refuse(&format!("{SQUARE}f 1 2 -9223372036854775808\n"), &["line 5"]);
     refuse(&format!("{SQUARE}f 1/1 2/1 3/1\n"), &["line 5", "texture coordinate 1 of 0"]);
     refuse(&format!("{SQUARE}f /1 2 3\n"), &["line 5"]);
-    refuse("v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n", &["vertex 1", "not finite"]);
+    refuse("v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n", &["vertex 2", "not finite"]);
     refuse("v 0 0 0\nv 1 0 0\nv 0 1e30 0\nf 1 2 3\n", &["vertex 2", "origin"]);
     let loaded = Folder::new().load("scene.obj", [SQUARE, "f 1 2\nl 1 2\nf 1 1 2\nf 1 2 3\ncurv 1\n"].concat());
     assert_eq!(loaded.scene.meshes[0].triangles.len(), 1);
