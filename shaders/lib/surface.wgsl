@@ -102,7 +102,7 @@ fn surface_shading_normal(
     direction: vec3<f32>,
 ) -> vec3<f32> {
     let side = select(-1.0, 1.0, front);
-    if (p.flags & PRIMITIVE_SPHERE) != 0u {
+    if (p.flags & (PRIMITIVE_SPHERE | PRIMITIVE_FLAT)) != 0u {
         return side * outward;
     }
     let i = p.vertices;

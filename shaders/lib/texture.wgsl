@@ -20,7 +20,7 @@ fn vertex_color(color: vec2<u32>) -> vec4<f32> {
 const WHITE: u32 = 0x3c003c00u;
 
 fn attributes_at(p: Primitive, u: f32, v: f32) -> Attributes {
-    if (p.flags & PRIMITIVE_SPHERE) != 0u {
+    if (p.flags & (PRIMITIVE_SPHERE | PRIMITIVE_PLAIN)) != 0u {
         return Attributes(vec2(0.0), vec2(0.0), vec4(1.0));
     }
     let a = vertices[p.vertices.x];
