@@ -5,11 +5,13 @@
 //! Boxes are not grown by the radius: a query tests its ball against them, so one tree serves every radius, and k-NN can
 //! shrink its ball as it goes.
 
+use std::ops::ControlFlow;
+
 use glam::Vec3;
 use rayon::prelude::*;
 use wide::f32x8;
 
-use super::{FANOUT, LEAF_SIZE, RadiusSearch};
+use super::{Error, FANOUT, LEAF_SIZE, Nearest, RadiusSearch, check_points};
 use crate::math::morton;
 
 const WIDTH: usize = FANOUT as usize;
@@ -44,11 +46,12 @@ pub struct PointBvh {
 }
 
 impl PointBvh {
-    /// Over all of `points`. They must be finite.
-    pub fn new(points: &[Vec3]) -> Self {
+    /// Over all of `points`.
+    pub fn new(points: &[Vec3]) -> Result<Self, Error> {
+        check_points(points)?;
         let mut tree = Self::default();
         tree.rebuild(points.len(), |i| points[i]);
-        tree
+        Ok(tree)
     }
 
     /// Over `n` other points, reusing the memory. They must be finite.
@@ -108,16 +111,6 @@ impl PointBvh {
         self.keys.par_iter().with_min_len(8192).map(|k| k.1).collect_into_vec(&mut self.order);
     }
 
-    /// Number of points.
-    pub fn len(&self) -> usize {
-        self.order.len()
-    }
-
-    /// Whether there are no points.
-    pub fn is_empty(&self) -> bool {
-        self.order.is_empty()
-    }
-
     /// Index of the point in each slot: slots are what [`PointBvh::visit`] reports.
     pub fn order(&self) -> &[u32] {
         &self.order
@@ -142,59 +135,37 @@ impl PointBvh {
     /// slots.
     #[inline]
     pub fn visit(&self, centre: Vec3, radius: f32, mut visit: impl FnMut(u32, f32)) {
-        let radius2 = (radius * radius).min(f32::MAX); // padding lies at infinity
-        self.walk(centre, |_| radius2, |slot, d2, _| visit(slot, d2), radius2);
-    }
-
-    /// Distance to the `k`-th nearest point within `radius` (k from 1 to 64), squared; none if there are fewer.
-    pub fn kth_nearest(&self, centre: Vec3, k: usize, radius: f32) -> Option<f32> {
-        assert!((1..=64).contains(&k), "k is {k}");
-        let mut nearest = [f32::INFINITY; 64];
-        let mut found = 0;
-        let radius2 = (radius * radius).min(f32::MAX); // padding lies at infinity
-        self.walk(
+        let _: ControlFlow<()> = self.walk(
             centre,
-            |bound: &f32| *bound,
-            |_, d2, bound| {
-                if found == k && d2 >= nearest[k - 1] {
-                    return;
-                }
-                let mut at = found.min(k - 1);
-                while at > 0 && nearest[at - 1] > d2 {
-                    nearest[at] = nearest[at - 1];
-                    at -= 1;
-                }
-                nearest[at] = d2;
-                found = (found + 1).min(k);
-                if found == k {
-                    *bound = bound.min(nearest[k - 1]);
-                }
+            &mut squared(radius),
+            |r2| *r2,
+            |_, slot, d2| {
+                visit(slot, d2);
+                ControlFlow::Continue(())
             },
-            radius2,
         );
-        (found == k).then(|| nearest[k - 1])
     }
 
-    /// Depth first; `bound` may shrink through the state that `visit` is handed.
+    /// Depth first; `bound` of the state may shrink as `visit` changes it.
     #[inline]
-    fn walk(
+    fn walk<S, B>(
         &self,
         centre: Vec3,
-        bound: impl Fn(&f32) -> f32,
-        mut visit: impl FnMut(u32, f32, &mut f32),
-        mut state: f32,
-    ) {
-        let Some(top) = self.levels.len().checked_sub(1) else { return };
+        state: &mut S,
+        bound: impl Fn(&S) -> f32,
+        mut visit: impl FnMut(&mut S, u32, f32) -> ControlFlow<B>,
+    ) -> ControlFlow<B> {
+        let Some(top) = self.levels.len().checked_sub(1) else { return ControlFlow::Continue(()) };
         let c = [f32x8::splat(centre.x), f32x8::splat(centre.y), f32x8::splat(centre.z)];
         // Children of each level that are still to be entered: octet and bits.
         let mut pending = [(0u32, 0u32); MAX_LEVELS];
         let mut level = top;
-        pending[top] = (0, self.boxes[self.levels[top] as usize].within(&c, bound(&state)));
+        pending[top] = (0, self.boxes[self.levels[top] as usize].within(&c, bound(state)));
         loop {
             let (octet, bits) = pending[level];
             if bits == 0 {
                 if level == top {
-                    return;
+                    return ControlFlow::Continue(());
                 }
                 level += 1;
                 continue;
@@ -204,11 +175,11 @@ impl PointBvh {
             if level > 0 {
                 level -= 1;
                 let octet = &self.boxes[(self.levels[level] + child) as usize];
-                pending[level] = (child, octet.within(&c, bound(&state)));
+                pending[level] = (child, octet.within(&c, bound(state)));
                 continue;
             }
             let d2 = self.leaves[child as usize].distance2(&c);
-            let mut inside = d2.simd_le(f32x8::splat(bound(&state))).to_bitmask();
+            let mut inside = d2.simd_le(f32x8::splat(bound(state))).to_bitmask();
             if inside == 0 {
                 continue;
             }
@@ -216,15 +187,44 @@ impl PointBvh {
             while inside != 0 {
                 let i = inside.trailing_zeros();
                 inside &= inside - 1;
-                visit(child * LEAF_SIZE + i, d2[i as usize], &mut state);
+                visit(state, child * LEAF_SIZE + i, d2[i as usize])?;
             }
         }
     }
 }
 
+/// Padding lies at infinity: no bound reaches it.
+fn squared(radius: f32) -> f32 {
+    (radius * radius).min(f32::MAX)
+}
+
 impl RadiusSearch for PointBvh {
-    fn within(&self, centre: Vec3, radius: f32, mut visit: impl FnMut(u32, f32)) {
-        self.visit(centre, radius, |slot, d2| visit(self.order[slot as usize], d2));
+    fn len(&self) -> usize {
+        self.order.len()
+    }
+
+    #[inline]
+    fn try_within<B>(
+        &self,
+        centre: Vec3,
+        radius: f32,
+        mut visit: impl FnMut(u32, f32) -> ControlFlow<B>,
+    ) -> ControlFlow<B> {
+        self.walk(centre, &mut squared(radius), |r2| *r2, |_, slot, d2| visit(self.order[slot as usize], d2))
+    }
+
+    fn nearest(&self, centre: Vec3, radius: f32, nearest: &mut Nearest) {
+        nearest.clear();
+        let radius2 = squared(radius);
+        let _: ControlFlow<()> = self.walk(
+            centre,
+            nearest,
+            |nearest| nearest.bound().min(radius2),
+            |nearest, slot, d2| {
+                nearest.insert(self.order[slot as usize], d2);
+                ControlFlow::Continue(())
+            },
+        );
     }
 }
 

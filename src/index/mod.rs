@@ -1,21 +1,154 @@
-//! Radius search over points, usable alone: nothing here knows of photons.
+//! Neighbour search over points: radius search and truncated k-NN. Usable alone: nothing here knows of photons.
+//!
+//! Everything is in the caller's unit. A point is within a radius when |p − q|² ≤ r², the squares taken in `f32` as
+//! x² + y² + z² from left to right, so that every index finds the same set, bit for bit.
 
+mod batch;
 mod bvh;
+mod nearest;
+
+use std::ops::ControlFlow;
 
 use glam::Vec3;
 
+pub use batch::{NearestLists, Neighbours, Radii};
 pub use bvh::PointBvh;
+pub use nearest::{MAX_K, Nearest, Neighbour};
 
 /// Points in one leaf of [`PointBvh`].
 pub const LEAF_SIZE: u32 = 8;
 /// Children of one of its inner nodes.
 pub const FANOUT: u32 = 8;
 
-/// What every index answers.
-pub trait RadiusSearch {
-    /// Calls `visit` once for each point with |p − centre|² ≤ radius², squares taken in `f32` as x² + y² + z² from left
-    /// to right; with the point's index and that squared distance. In no particular order.
-    fn within(&self, centre: Vec3, radius: f32, visit: impl FnMut(u32, f32));
+/// Why a search cannot be made or asked.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// NaN or infinite.
+    #[error("{what} {at} is not finite")]
+    NotFinite {
+        /// `point` or `query`.
+        what: &'static str,
+        /// Its index.
+        at: usize,
+    },
+    /// More points than `u32` counts (the last value stands for none).
+    #[error("{0} points: at most {max} can be indexed", max = u32::MAX - 1)]
+    TooMany(usize),
+    /// NaN or negative.
+    #[error("radius {radius} of query {query} is not zero or more")]
+    Radius {
+        /// Index of the query.
+        query: usize,
+        /// As given.
+        radius: f32,
+    },
+    /// Above [`RadiusSearch::max_radius`]: neighbours would be missed.
+    #[error("radius {radius} of query {query} is above {built}, for which the index was built")]
+    RadiusAboveBuilt {
+        /// Index of the query.
+        query: usize,
+        /// As given.
+        radius: f32,
+        /// What the index answers.
+        built: f32,
+    },
+    /// Not in 1 … [`MAX_K`].
+    #[error("k is {0}: 1 to {MAX_K} are possible")]
+    K(usize),
+    /// As many radii as queries are needed.
+    #[error("{radii} radii for {queries} queries")]
+    Lengths {
+        /// Number of queries.
+        queries: usize,
+        /// Number of radii.
+        radii: usize,
+    },
+}
+
+/// What every index answers: one query at a time, or all of a slice on all threads.
+///
+/// A single query takes a finite centre and a radius from 0 to [`RadiusSearch::max_radius`]; the forms over slices check
+/// that, and return an error.
+pub trait RadiusSearch: Sync {
+    /// Number of points.
+    fn len(&self) -> usize;
+
+    /// Whether there are none.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The largest radius that may be asked for: infinite unless the index was built for one.
+    fn max_radius(&self) -> f32 {
+        f32::INFINITY
+    }
+
+    /// Calls `visit` once for each point within `radius`, with its index and squared distance, in no particular order,
+    /// until it breaks.
+    fn try_within<B>(&self, centre: Vec3, radius: f32, visit: impl FnMut(u32, f32) -> ControlFlow<B>)
+    -> ControlFlow<B>;
+
+    /// Calls `visit` once for each point within `radius`, with its index and squared distance, in no particular order.
+    #[inline]
+    fn within(&self, centre: Vec3, radius: f32, mut visit: impl FnMut(u32, f32)) {
+        let _: ControlFlow<()> = self.try_within(centre, radius, |i, d2| {
+            visit(i, d2);
+            ControlFlow::Continue(())
+        });
+    }
+
+    /// Number of points within `radius`.
+    fn count(&self, centre: Vec3, radius: f32) -> usize {
+        let mut n = 0;
+        self.within(centre, radius, |_, _| n += 1);
+        n
+    }
+
+    /// Truncated k-NN: replaces what is in `nearest` by the nearest points within `radius`, as many as it takes
+    /// ([`Nearest::new`]). Of points equally far the one of lower index is nearer.
+    fn nearest(&self, centre: Vec3, radius: f32, nearest: &mut Nearest) {
+        nearest.clear();
+        self.within(centre, radius, |i, d2| nearest.insert(i, d2));
+    }
+
+    /// For each query, in place: `start(query)`, then `visit` with each neighbour's index and squared distance, in no
+    /// particular order. What it leaves behind comes back, in the order of the queries.
+    fn fold_all<T: Send>(
+        &self,
+        queries: &[Vec3],
+        radii: Radii<'_>,
+        start: impl Fn(usize) -> T + Sync,
+        visit: impl Fn(&mut T, u32, f32) + Sync,
+    ) -> Result<Vec<T>, Error>
+    where
+        Self: Sized,
+    {
+        batch::fold_each(self, queries, radii, start, visit)
+    }
+
+    /// Number of neighbours of each query.
+    fn count_all(&self, queries: &[Vec3], radii: Radii<'_>) -> Result<Vec<u32>, Error>
+    where
+        Self: Sized,
+    {
+        self.fold_all(queries, radii, |_| 0, |n, _, _| *n += 1)
+    }
+
+    /// All neighbours of all queries, sized by counting first.
+    fn neighbours_all(&self, queries: &[Vec3], radii: Radii<'_>) -> Result<Neighbours, Error>
+    where
+        Self: Sized,
+    {
+        batch::neighbours(self, queries, radii)
+    }
+
+    /// Truncated k-NN of all queries; `k` from 1 to [`MAX_K`].
+    fn nearest_all(&self, queries: &[Vec3], radii: Radii<'_>, k: usize) -> Result<NearestLists, Error>
+    where
+        Self: Sized,
+    {
+        batch::nearest(self, queries, radii, k)
+    }
 }
 
 /// The squared distance as every index computes it.
@@ -25,17 +158,38 @@ pub fn distance2(a: Vec3, b: Vec3) -> f32 {
     d.x * d.x + d.y * d.y + d.z * d.z
 }
 
+/// Refuses points that no index takes.
+pub fn check_points(points: &[Vec3]) -> Result<(), Error> {
+    if points.len() >= u32::MAX as usize {
+        return Err(Error::TooMany(points.len()));
+    }
+    match points.iter().position(|p| !p.is_finite()) {
+        Some(at) => Err(Error::NotFinite { what: "point", at }),
+        None => Ok(()),
+    }
+}
+
 /// Tests every point: the oracle of the others.
 #[derive(Clone, Copy, Debug)]
 pub struct BruteForce<'a>(pub &'a [Vec3]);
 
 impl RadiusSearch for BruteForce<'_> {
-    fn within(&self, centre: Vec3, radius: f32, mut visit: impl FnMut(u32, f32)) {
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    fn try_within<B>(
+        &self,
+        centre: Vec3,
+        radius: f32,
+        mut visit: impl FnMut(u32, f32) -> ControlFlow<B>,
+    ) -> ControlFlow<B> {
         for (i, &p) in self.0.iter().enumerate() {
             let d2 = distance2(p, centre);
             if d2 <= radius * radius {
-                visit(i as u32, d2);
+                visit(i as u32, d2)?;
             }
         }
+        ControlFlow::Continue(())
     }
 }

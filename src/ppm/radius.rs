@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use crate::index::PointBvh;
+use crate::index::{Nearest, PointBvh, RadiusSearch};
 use crate::layout::{Camera, EYE_GATHER, EyeVertex, Frame, Photon};
 
 /// Knaus & Zwicker 2011, equation 15 and its product form: r²(i+1) = r²(i)·(i+α)/(i+1), so
@@ -50,13 +50,17 @@ const LEAST_OF_PIXEL: f32 = 0.7;
 /// First radius of each film pixel, metres, `[h·w]`: to the tenth nearest photon of a first pass, between a share of the
 /// pixel's footprint and a multiple of the picture's median. Pixels that gather nothing take the median.
 pub fn first_radii(frame: &Frame, camera: &Camera, eye: &[EyeVertex], photons: &[Photon]) -> Vec<f32> {
-    let positions: Vec<Vec3> = photons.iter().map(|p| p.position.into()).collect();
-    let tree = PointBvh::new(&positions);
+    let mut tree = PointBvh::default();
+    tree.rebuild(photons.len(), |i| photons[i].position.into());
     let gathers = |v: &EyeVertex| v.flags & EYE_GATHER != 0;
     // A first look at some of the pixels bounds the search for all of them.
     let step = (eye.len() / 4096).max(1);
     let sample: Vec<&EyeVertex> = eye.iter().step_by(step).filter(|v| gathers(v)).collect();
-    let reach = |v: &EyeVertex, most: f32| tree.kth_nearest(v.position.into(), REACHED, most).map(f32::sqrt);
+    let reach = |v: &EyeVertex, most: f32| {
+        let mut nearest = Nearest::new(REACHED);
+        tree.nearest(v.position.into(), most, &mut nearest);
+        nearest.kth().map(|last| last.distance2.sqrt())
+    };
     let mut distances: Vec<f32> = sample.par_iter().filter_map(|v| reach(v, f32::INFINITY)).collect();
     distances.sort_unstable_by(f32::total_cmp);
     let Some(&median) = distances.get(distances.len() / 2) else {
