@@ -1,4 +1,4 @@
-// What every kernel sees: the constants of the iteration and the arguments of one dispatch.
+// What every kernel sees: the arguments of one dispatch.
 #import layout
 
 struct Arguments {
@@ -9,7 +9,6 @@ struct Arguments {
 }
 
 @group(1) @binding(0) var<uniform> arguments: Arguments;
-@group(1) @binding(1) var<uniform> frame: Frame;
 
 // Index of a thread in a dispatch that may be spread over two dimensions; `threads` a workgroup.
 fn thread_index(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32, threads: u32) -> u32 {

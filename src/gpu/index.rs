@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::buffers::Array;
 use super::context::Context;
 use super::kernels::{Access, Arguments, Batch, Kernel, Modules};
+use crate::device::Error;
 use crate::layout::{FANOUT, LEAF_SIZE, PointBox};
-use crate::ppm::Error;
 
 /// Photons a workgroup of `bounds.wgsl` and `sort.wgsl` handles: `BLOCK` there.
 const BLOCK: u32 = 2048;

@@ -4,6 +4,7 @@
 const LIBRARY: &[(&str, &str)] = &[
     ("layout", include_str!("../../shaders/layout.wgsl")),
     ("common", include_str!("../../shaders/lib/common.wgsl")),
+    ("frame", include_str!("../../shaders/lib/frame.wgsl")),
     ("oct", include_str!("../../shaders/lib/oct.wgsl")),
     ("rng", include_str!("../../shaders/lib/rng.wgsl")),
     ("basis", include_str!("../../shaders/lib/basis.wgsl")),
