@@ -25,3 +25,9 @@ fn tile_pixel(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32, width: u3
     let y = ((local >> 2u) & 1u) | ((local >> 3u) & 6u);
     return corner + vec2(x, y);
 }
+
+// (first box, number of boxes) of a level of the tree.
+fn level_of(level: u32) -> vec2<u32> {
+    let pair = arguments.levels[level / 2u];
+    return select(pair.zw, pair.xy, (level & 1u) == 0u);
+}

@@ -19,6 +19,7 @@ const LIBRARY: &[(&str, &str)] = &[
     ("bsdf_surface", include_str!("../../shaders/lib/bsdf_surface.wgsl")),
     ("light", include_str!("../../shaders/lib/light.wgsl")),
     ("camera", include_str!("../../shaders/lib/camera.wgsl")),
+    ("tree", include_str!("../../shaders/lib/tree.wgsl")),
     ("photon_paths", include_str!("../../shaders/lib/photon_paths.wgsl")),
 ];
 

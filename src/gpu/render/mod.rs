@@ -243,10 +243,10 @@ impl Stages for GpuStages {
                 self.eye_vertices.range(first, n),
                 self.first_radii.range(first, n),
                 self.photons.all(),
-                self.index.boxes.all(),
+                self.index.nodes.all(),
                 self.radiance.range(first, n),
             ];
-            let arguments = self.index.arguments([rows, self.n_photons, 0, 0]);
+            let arguments = self.index.arguments([rows, self.n_photons, self.index.levels.len() as u32, 0]);
             batch.dispatch(&self.gather, &buffers, arguments, tiles(frame.width, rows));
         }
         self.timer.end(GATHER, batch, &self.context)
