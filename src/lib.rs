@@ -1,6 +1,6 @@
 //! Sunfleck: progressive photon mapping, and the neighbour search under it.
 //!
-//! Import order, left never names right: `math` → `index` → `layout` → `scene` → `ppm` → `cpu` | `gpu` → `output`.
+//! Import order, left never names right: `math` → `index` → `points` → `layout` → `scene` → `ppm` → `cpu` | `gpu` → `output`.
 //! `cpu` and `gpu` do not know each other.
 
 #[cfg(feature = "render")]
@@ -12,6 +12,8 @@ pub mod layout;
 pub mod math;
 #[cfg(feature = "render")]
 pub mod output;
+#[cfg(feature = "points")]
+pub mod points;
 #[cfg(feature = "render")]
 pub mod ppm;
 #[cfg(feature = "render")]

@@ -3,9 +3,10 @@
 use std::path::Path;
 
 /// Each module with those it may use.
-const ALLOWED: [(&str, &[&str]); 8] = [
+const ALLOWED: [(&str, &[&str]); 9] = [
     ("math", &[]),
     ("index", &["math"]),
+    ("points", &["index", "math"]),
     ("layout", &["index", "math"]),
     ("scene", &["layout", "index", "math"]),
     ("ppm", &["scene", "layout", "index", "math"]),
