@@ -1,7 +1,8 @@
 """scipy.spatial.cKDTree: arguments and output as those of rust/src/main.rs.
 
 It cannot fold neighbours in place. Its nearest operation is timed, query_ball_point with lists of indices, in chunks so
-that they fit in memory; the kernel sum is taken from the lists, outside the time.
+that they fit in memory; the kernel sum is taken from the lists of the first chunk, outside the time, and is given where
+that was all.
 """
 
 import itertools
@@ -37,16 +38,17 @@ class Clock:
 
 
 def kernel(tree, points, queries, radius, clock):
-    neighbours, total = 0, 0.0
+    neighbours, total = 0, None
     for chunk in numpy.split(queries, range(CHUNK, len(queries), CHUNK)):
         with clock:
             lists = tree.query_ball_point(chunk, radius, workers=1, return_sorted=False)
         lengths = numpy.fromiter(map(len, lists), dtype=numpy.int64, count=len(lists))
         n = int(lengths.sum())
-        indices = numpy.fromiter(itertools.chain.from_iterable(lists), dtype=numpy.int64, count=n)
-        d = points[indices] - numpy.repeat(chunk, lengths, axis=0)
         neighbours += n
-        total += n - float((d * d).sum(dtype=numpy.float64)) / (radius * radius)
+        if len(queries) <= CHUNK:
+            indices = numpy.fromiter(itertools.chain.from_iterable(lists), dtype=numpy.int64, count=n)
+            d = points[indices] - numpy.repeat(chunk, lengths, axis=0)
+            total = n - float((d * d).sum(dtype=numpy.float64)) / (radius * radius)
     return neighbours, total
 
 
