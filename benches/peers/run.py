@@ -58,7 +58,7 @@ def main():
     programs, versions, missing = build(wanted, args.portable)
     sets = {name: make for name, make in point_sets(programs, args.shuffled).items() if name in args.sets.split(",")}
 
-    lines = []
+    lines, report = [], {}
     for number in range(args.rounds + 1):
         for name, (points, cases) in sets.items():
             for library in [w for w in wanted if w in programs]:
@@ -71,22 +71,21 @@ def main():
                 if error:
                     missing[library] = error
                     del programs[library]
-    disagreements = check(lines)
-    lines = [line for line in lines if line["round"] > 0]
-    report = {
-        "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="minutes"),
-        "command": " ".join([os.path.relpath(__file__), *sys.argv[1:]]),
-        "device": device(),
-        "target": "portable" if args.portable else "native",
-        "versions": versions,
-        "missing": missing,
-        "disagreements": disagreements,
-        "measurements": lines,
-    }
-    args.output.parent.mkdir(parents=True, exist_ok=True)
-    args.output.write_text(json.dumps(report, indent=1) + "\n")
+        report = {
+            "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="minutes"),
+            "command": " ".join([os.path.relpath(__file__), *sys.argv[1:]]),
+            "device": device(),
+            "target": "portable" if args.portable else "native",
+            "rounds": number,
+            "versions": versions,
+            "missing": missing,
+            "disagreements": check(lines),
+            "measurements": [line for line in lines if line["round"] > 0],
+        }
+        args.output.parent.mkdir(parents=True, exist_ok=True)
+        args.output.write_text(json.dumps(report, indent=1) + "\n")
     print(markdown(report, wanted))
-    return 1 if disagreements else 0
+    return 1 if report["disagreements"] else 0
 
 
 def build(wanted, portable):
@@ -176,7 +175,8 @@ def device():
 
 
 def markdown(report, wanted):
-    text = [f"{report['device']}; {report['date']}; {report['target']} build; `{report['command']}`.", ""]
+    text = [f"{report['device']}; {report['date']}; {report['target']} build, medians of {report['rounds']} rounds; "
+        f"`{report['command']}`.", ""]
     text += tables(report["measurements"], wanted)
     text += ["Versions: " + ", ".join(f"{k} {v}" for k, v in report["versions"].items() if k in wanted) + "."]
     text += [f"Missing: {library}: {why}" for library, why in report["missing"].items()]

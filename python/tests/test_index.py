@@ -1,6 +1,8 @@
 """Against scipy.spatial.cKDTree, and at the edges."""
 
+import sys
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -218,20 +220,29 @@ def test_single_precision_arrays_are_not_copied():
 
 
 def test_other_threads_run_during_a_search():
-    points = cloud("uniform", 200_000, 12)
+    points = cloud("uniform", 50_000, 12)
     index = sunfleck.Index(points)
-    ticks, searching = [0], threading.Event()
+    ticks, over = [0], threading.Event()
 
     def tick():
-        while not searching.is_set():
+        while not over.is_set():
             ticks[0] += 1
+            time.sleep(0)
 
+    def ticks_during(work):
+        before = ticks[0]
+        work()
+        return ticks[0] - before
+
+    interval = sys.getswitchinterval()
     thread = threading.Thread(target=tick)
     thread.start()
-    before = ticks[0]
-    index.count(points[:100_000], 0.05)
-    during = ticks[0] - before
-    searching.set()
-    thread.join()
-    # Were the lock held throughout, only what runs between two bytecodes would have counted.
-    assert during > 10_000
+    # No thread is made to give up the lock: this one keeps it unless the work itself lets go.
+    sys.setswitchinterval(1000)
+    try:
+        assert ticks_during(lambda: sum(range(1_000_000))) == 0
+        assert any(ticks_during(lambda: index.count(points, 0.05)) > 0 for _ in range(20))
+    finally:
+        sys.setswitchinterval(interval)
+        over.set()
+        thread.join()

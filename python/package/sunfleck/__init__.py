@@ -56,10 +56,10 @@ class Index:
         rows, single = _queries(q)
         offsets, indices, distances = self._tree.within(rows, *self._radius(r))
         # What lies in memory is below 2^63: the same bits.
-        found = (indices,) if single else (offsets.view(np.int64), indices)
+        found: list[NDArray[Any]] = [indices] if single else [offsets.view(np.int64), indices]
         if return_distance:
-            found += (distances,)
-        return found[0] if len(found) == 1 else found
+            found.append(distances)
+        return found[0] if len(found) == 1 else tuple(found)
 
     def query(self, q: ArrayLike, k: int = 1, distance_upper_bound: ArrayLike = math.inf) -> Any:
         """The `k` nearest points of each query: `(distances, indices)`, nearest first, of equal ones the lower index first.
