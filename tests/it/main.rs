@@ -9,6 +9,7 @@ mod gpu;
 #[cfg(feature = "gpu")]
 mod gpu_search;
 mod index;
+mod indices;
 mod layering;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod layout;
