@@ -1,5 +1,6 @@
 // The nearest points of each query, sorted, ties in order of the index. The lists lie in the results: the ball shrinks as
-// they fill, so that few points get that far.
+// they fill, so that few points get that far. So that it is small from the beginning, the points of the node that is
+// likely to hold the nearest ones come first.
 #import search
 
 @group(0) @binding(4) var<storage, read_write> found: array<u32>;
@@ -15,16 +16,53 @@ struct Visitor {
     radius2: f32,
     row: u32,
     n: u32,
+    // The SEEDS points from here on are known already.
+    seeds: u32,
+}
+
+// Points of a node of level 0.
+const SEEDS: u32 = LEAF_SIZE * FANOUT;
+
+// First point of a node of level 0: always the nearest child, from the top down. There are at least two levels.
+fn near_node(centre: vec3<f32>, n_levels: u32) -> u32 {
+    var k = 0u;
+    for (var level = n_levels - 1u; level > 1u; level--) {
+        let node = tree[level_of(level).x - level_of(0u).y + k];
+        var children = distances_to_children(node, centre);
+        var nearest = 0u;
+        for (var i = 1u; i < (node.exponents >> 24u); i++) {
+            nearest = select(nearest, i, children[i / 4u][i % 4u] < children[nearest / 4u][nearest % 4u]);
+        }
+        k = k * FANOUT + nearest;
+    }
+    return k * SEEDS;
 }
 
 // further.z: k.
-fn begin(query: u32, centre: vec3<f32>, radius: f32) -> Visitor {
+fn begin(query: u32, centre: vec3<f32>, radius2: f32) -> Visitor {
     var visitor: Visitor;
+    visitor.radius2 = radius2;
     visitor.row = query * arguments.further.z;
+    visitor.seeds = NONE;
+    if arguments.further.y < 2u {
+        return visitor;
+    }
+    let first = near_node(centre, arguments.further.y);
+    for (var slot = first; slot < min(first + SEEDS, arguments.further.x); slot++) {
+        let delta = position_of(slot) - centre;
+        let distance2 = delta.x * delta.x + delta.y * delta.y + delta.z * delta.z;
+        if distance2 <= visitor.radius2 {
+            visit(&visitor, slot, delta, distance2);
+        }
+    }
+    visitor.seeds = first;
     return visitor;
 }
 
 fn visit(visitor: ptr<function, Visitor>, slot: u32, delta: vec3<f32>, distance2: f32) {
+    if slot - (*visitor).seeds < SEEDS && (*visitor).seeds != NONE {
+        return;
+    }
     let k = arguments.further.z;
     let row = (*visitor).row;
     let bits = bitcast<u32>(distance2);
