@@ -1,13 +1,16 @@
 // The nearest points of each query, sorted, ties in order of the index. The lists lie in the results: the ball shrinks as
-// they fill, so that few points get that far. So that it is small from the beginning, the points of the node that is
-// likely to hold the nearest ones come first.
+// they fill, so that few points get that far. So that it is small from the beginning, the points that are next to
+// the query in Morton order come first.
 #import search
+#import morton_code
 
 @group(0) @binding(4) var<storage, read_write> found: array<u32>;
 // [query][k]
 @group(0) @binding(5) var<storage, read_write> indices: array<u32>;
 // The bits of squared distances, which are ordered as the numbers are.
 @group(0) @binding(6) var<storage, read_write> distances2: array<u32>;
+// All levels of the tree, the one around all points last.
+@group(0) @binding(7) var<storage, read> boxes: array<PointBox>;
 
 const INFINITE: u32 = 0x7f800000u;
 
@@ -16,51 +19,58 @@ struct Visitor {
     radius2: f32,
     row: u32,
     n: u32,
-    // The SEEDS points from here on are known already.
-    seeds: u32,
+    // Slots that are known already: the first, and their number.
+    seeds: vec2<u32>,
 }
 
-// Points of a node of level 0.
-const SEEDS: u32 = LEAF_SIZE * FANOUT;
-
-// First point of a node of level 0: always the nearest child, from the top down. There are at least two levels.
-fn near_node(centre: vec3<f32>, n_levels: u32) -> u32 {
-    var k = 0u;
-    for (var level = n_levels - 1u; level > 1u; level--) {
-        let node = tree[level_of(level).x - level_of(0u).y + k];
-        var children = distances_to_children(node, centre);
-        var nearest = 0u;
-        for (var i = 1u; i < (node.exponents >> 24u); i++) {
-            nearest = select(nearest, i, children[i / 4u][i % 4u] < children[nearest / 4u][nearest % 4u]);
+// Number of points before the query in Morton order.
+fn rank_of(centre: vec3<f32>, n_points: u32, n_levels: u32) -> u32 {
+    let all = boxes[level_of(n_levels - 1u).x];
+    let code = morton_code(centre, all.min, all.max);
+    var low = 0u;
+    var high = n_points;
+    while low < high {
+        let middle = low + (high - low) / 2u;
+        let other = morton_code(position_of(middle), all.min, all.max);
+        if other.y < code.y || (other.y == code.y && other.x < code.x) {
+            low = middle + 1u;
+        } else {
+            high = middle;
         }
-        k = k * FANOUT + nearest;
     }
-    return k * SEEDS;
+    return low;
 }
 
 // further.z: k.
 fn begin(query: u32, centre: vec3<f32>, radius2: f32) -> Visitor {
+    let n_points = arguments.further.x;
+    let k = arguments.further.z;
     var visitor: Visitor;
     visitor.radius2 = radius2;
-    visitor.row = query * arguments.further.z;
-    visitor.seeds = NONE;
-    if arguments.further.y < 2u {
+    visitor.row = query * k;
+    if n_points == 0u {
         return visitor;
     }
-    let first = near_node(centre, arguments.further.y);
-    for (var slot = first; slot < min(first + SEEDS, arguments.further.x); slot++) {
+    let rank = rank_of(centre, n_points, arguments.further.y);
+    let n = min(clamp(2u * k, 8u, 64u), n_points);
+    let first = min(max(rank, n / 2u) - n / 2u, n_points - n);
+    for (var i = 0u; i < n; i++) {
+        // From the query's place outwards, to both sides in turn; around the end where there are no more on one.
+        let step = select(i / 2u, n - (i + 1u) / 2u, (i & 1u) != 0u);
+        let slot = first + (rank - first + step) % n;
         let delta = position_of(slot) - centre;
         let distance2 = delta.x * delta.x + delta.y * delta.y + delta.z * delta.z;
         if distance2 <= visitor.radius2 {
             visit(&visitor, slot, delta, distance2);
         }
     }
-    visitor.seeds = first;
+    visitor.seeds = vec2(first, n);
     return visitor;
 }
 
 fn visit(visitor: ptr<function, Visitor>, slot: u32, delta: vec3<f32>, distance2: f32) {
-    if slot - (*visitor).seeds < SEEDS && (*visitor).seeds != NONE {
+    // A slot before the first wraps around.
+    if slot - (*visitor).seeds.x < (*visitor).seeds.y {
         return;
     }
     let k = arguments.further.z;

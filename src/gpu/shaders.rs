@@ -21,6 +21,7 @@ const LIBRARY: &[(&str, &str)] = &[
     ("camera", include_str!("../../shaders/lib/camera.wgsl")),
     ("tree", include_str!("../../shaders/lib/tree.wgsl")),
     ("search", include_str!("../../shaders/lib/search.wgsl")),
+    ("morton_code", include_str!("../../shaders/lib/morton_code.wgsl")),
     ("photon_paths", include_str!("../../shaders/lib/photon_paths.wgsl")),
 ];
 

@@ -580,9 +580,9 @@ fn speed() {
     println!("{}", search.context().info());
     let points = uniform(92, 200_000);
     search.build(&points).expect("build");
-    let side = 46;
+    let side = 24;
     let ordered: Vec<Vec3> = (0..side * side * side)
-        .map(|i| Vec3::new((i % side) as f32, (i / side % side) as f32, (i / side / side) as f32) / 23.0 - 1.0)
+        .map(|i| Vec3::new((i % side) as f32, (i / side % side) as f32, (i / side / side) as f32) / 12.0 - 1.0)
         .collect();
     let shuffled = uniform(93, side * side * side);
     // About 6.5 and 52 neighbours each.

@@ -135,7 +135,8 @@ impl PointSearch {
             indices: self.array("nearest points", n * k as u64)?,
             distances2: self.array("their distances", n * k as u64)?,
         };
-        let own = [lists.found.all(), lists.indices.all(), lists.distances2.all()];
+        let boxes = self.index.boxes.raw().clone();
+        let own = [lists.found.all(), lists.indices.all(), lists.distances2.all(), boxes.as_entire_binding()];
         let kernel = self.nearest.clone();
         self.launch(SEARCH, &kernel, &set, &own, k as u32)?;
         Ok(lists)

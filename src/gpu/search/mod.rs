@@ -87,7 +87,7 @@ impl PointSearch {
             scan_blocks: modules.kernel("scan", "scan_blocks", &scan)?,
             scan_sums: modules.kernel("scan", "scan_sums", &scan)?,
             scan_offsets: modules.kernel("scan", "scan_offsets", &scan)?,
-            nearest: modules.kernel("nearest", "search", &[Read, Read, Read, Read, Write, Write, Write])?,
+            nearest: modules.kernel("nearest", "search", &[Read, Read, Read, Read, Write, Write, Write, Read])?,
             index,
             given: Array::new::<Vec3>("points"),
             points: Array::new::<[u32; 4]>("points in tree order"),
