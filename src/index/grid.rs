@@ -185,7 +185,7 @@ impl HashGrid {
     /// First and last cell within the reach along an axis.
     #[inline]
     fn window(&self, x: f32, reach: f32, axis: usize) -> Option<(u32, u32)> {
-        let (from, to) = ((x - reach).next_down().max(f32::MIN), (x + reach).next_up().min(f32::MAX));
+        let (from, to) = ((x - reach).max(f32::MIN), (x + reach).min(f32::MAX));
         let to_cell = to * self.scale - self.base[axis];
         let (from, to) = (self.cell(from, axis), (to_cell as u32).min(self.last[axis]));
         (to_cell >= 0.0 && from <= to).then(|| {
