@@ -5,7 +5,10 @@
 
 mod batch;
 mod bvh;
+mod lanes;
 mod nearest;
+mod packet;
+mod walk;
 
 use std::ops::ControlFlow;
 
