@@ -9,8 +9,8 @@ use rayon::prelude::*;
 
 use super::bvh::PointBvh;
 use super::lanes::{Lanes, Task, WIDTH, dispatch};
-use super::walk::{Reach, Walk, distance2, leaf_ids, squared};
-use super::{Error, Radii, RadiusSearch};
+use super::walk::{Reach, Walk, distance2, leaf_ids};
+use super::{Error, Radii, RadiusSearch, radius2};
 use crate::math::morton;
 
 /// Most queries in a packet.
@@ -77,9 +77,9 @@ impl Packet {
             if self.n > 0 && (sides.x + sides.y + sides.z > MAX_EXTENT * least || most > 2.0 * least) {
                 break;
             }
-            self.max_radius2 = squared(most);
+            self.max_radius2 = radius2(most);
             (self.min, self.max) = (min, max);
-            (self.centre[self.n], self.radius2[self.n]) = (centre, squared(radius));
+            (self.centre[self.n], self.radius2[self.n]) = (centre, radius2(radius));
             self.n += 1;
         }
     }

@@ -6,18 +6,12 @@ use glam::Vec3;
 
 use super::bvh::{Octet, PointBvh, Points};
 use super::lanes::{Lanes, Task, WIDTH, dispatch};
-use super::{FANOUT, LEAF_SIZE, Nearest};
+use super::{FANOUT, LEAF_SIZE, Nearest, radius2};
 
 /// 8^11 > 2^32.
 const MAX_LEVELS: usize = 11;
 /// Points found before they are handed out: a few leaves, so that the handing out is one loop.
 const BATCH: usize = 64;
-
-/// Padding lies at infinity: no bound reaches it.
-#[inline(always)]
-pub fn squared(radius: f32) -> f32 {
-    (radius * radius).min(f32::MAX)
-}
 
 /// All points within √bound of a box: a ball where the box is a point.
 #[derive(Clone, Copy)]
@@ -138,7 +132,7 @@ impl<B, V: FnMut(u32, f32) -> ControlFlow<B>> Task for Ball<'_, V> {
 
     #[inline(always)]
     fn run<L: Lanes>(mut self, on: L) -> ControlFlow<B> {
-        let reach = Reach::new(on, self.centre, self.centre, squared(self.radius));
+        let reach = Reach::new(on, self.centre, self.centre, radius2(self.radius));
         let mut walk = Walk::new(on, self.tree, &reach);
         let (mut ids, mut distances2) = ([0; BATCH + WIDTH], [0.0; BATCH + WIDTH]);
         loop {
@@ -201,7 +195,7 @@ impl Task for NearestOf<'_> {
     fn run<L: Lanes>(self, on: L) {
         let Self { tree, centre, radius, nearest } = self;
         let Some(top) = tree.levels.len().checked_sub(1) else { return };
-        let radius2 = squared(radius);
+        let radius2 = radius2(radius);
         let reach = Reach::new(on, centre, centre, radius2);
         // Of each level: octet, children still to be entered, and their squared distances.
         let mut pending = [(0u32, 0u32, [0.0f32; WIDTH]); MAX_LEVELS];
