@@ -16,13 +16,13 @@ HERE = pathlib.Path(__file__).resolve().parent
 OUT = HERE.parents[1] / "target" / "peers"
 
 # Library: what runs it, and where its version is said if it does not say it itself.
-RUST = ["sunfleck", "sunfleck-single", "kiddo", "obvhs-ploc", "obvhs-medium", "rstar"]
+RUST = ["sunfleck", "sunfleck-single", "sunfleck-grid", "kiddo", "obvhs-ploc", "obvhs-medium", "rstar"]
 CPP = ["embree", "flann", "nanoflann"]
 LIBRARIES = RUST + CPP + ["scipy"]
 TITLES = {
     "sunfleck": "Sunfleck, `PointBvh`, batch",
     "sunfleck-single": "Sunfleck, `PointBvh`, query by query",
-    "sunfleck-grid": "Sunfleck, `Grid`, sorted queries (the bar)",
+    "sunfleck-grid": "Sunfleck, `HashGrid`, sorted queries",
     "kiddo": "kiddo, `ImmutableKdTree`",
     "obvhs-ploc": "obvhs, PLOC, boxes grown by r",
     "obvhs-medium": "obvhs, medium quality, boxes grown by r",
