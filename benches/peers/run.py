@@ -36,7 +36,7 @@ RADII = ["0.005", "0.01", "0.02", "0.05"]
 KS = [1, 4, 8]
 KNN_RADIUS = "0.02"
 # Queries of the first round; all libraries give their sums of these.
-WARM_UP = 16384
+WARM_UP = 4096
 # Neighbours at the very edge of the ball may fall on either side: fused multiply-add, or double precision.
 TOLERANCE = 2e-5
 
