@@ -327,7 +327,7 @@ fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
 }
 
 /// As it could be typed again.
-fn command_line() -> String {
+pub fn command_line() -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_=./,:+%@".contains(c);
     let quote = |arg: String| match arg.chars().all(plain) && !arg.is_empty() {
         true => arg,
