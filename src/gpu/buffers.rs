@@ -6,7 +6,7 @@ use bytemuck::Pod;
 
 use super::context::{Buffer, Context};
 use super::kernels::Batch;
-use crate::ppm::Error;
+use crate::device::Error;
 
 /// An array on the device that keeps its memory from one iteration to the next.
 pub(super) struct Array {

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use super::kernels::Cache;
-use crate::ppm::Error;
+use crate::device::Error;
 
 /// What an adapter is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -116,7 +116,7 @@ fn can_compute(adapter: &wgpu::Adapter) -> bool {
 /// The first of our needs that these limits do not meet.
 fn missing_limit(limits: &wgpu::Limits) -> Option<(&'static str, u64, u64)> {
     [
-        ("storage buffers a shader", 10, u64::from(limits.max_storage_buffers_per_shader_stage)),
+        ("storage buffers a shader", 11, u64::from(limits.max_storage_buffers_per_shader_stage)),
         ("bytes of workgroup memory", 20 << 10, u64::from(limits.max_compute_workgroup_storage_size)),
         ("threads a workgroup", 64, u64::from(limits.max_compute_invocations_per_workgroup)),
         ("bytes in a storage binding", 1 << 27, limits.max_storage_buffer_binding_size),

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::buffers::Array;
 use super::context::Context;
 use super::kernels::{Access, Arguments, Batch, Kernel, Modules};
-use crate::layout::{FANOUT, LEAF_SIZE, PointBox};
-use crate::ppm::Error;
+use crate::device::Error;
+use crate::layout::{FANOUT, LEAF_SIZE, Photon, PointBox, TreeNode};
 
 /// Photons a workgroup of `bounds.wgsl` and `sort.wgsl` handles: `BLOCK` there.
 const BLOCK: u32 = 2048;
@@ -14,6 +14,8 @@ const BLOCK: u32 = 2048;
 const DIGIT_BITS: u32 = 7;
 /// Digits of a 63-bit key.
 const N_PASSES: u32 = 9;
+/// Words of a photon, whose position comes first.
+const WORDS: u32 = (size_of::<Photon>() / 4) as u32;
 /// Threads a workgroup.
 const THREADS: u32 = 64;
 
@@ -49,6 +51,8 @@ pub(super) struct Index {
     totals: Array,
     /// All levels, leaves first.
     pub(super) boxes: Array,
+    /// All levels but the leaves.
+    pub(super) nodes: Array,
     /// [`levels`] of the last build.
     pub(super) levels: Vec<[u32; 2]>,
 }
@@ -66,15 +70,16 @@ impl Index {
             sort_scan: modules.kernel("sort", "sort_scan", &sort)?,
             sort_scatter: modules.kernel("sort", "sort_scatter", &sort)?,
             permute: modules.kernel("permute", "permute", &[Read, Read, Write])?,
-            tree_leaves: modules.kernel("tree", "tree_leaves", &[Read, Write])?,
-            tree_level: modules.kernel("tree", "tree_level", &[Read, Write])?,
-            blocks: Array::new::<PointBox>("bounds of photon blocks"),
-            bounds: Array::new::<PointBox>("bounds of the photons"),
+            tree_leaves: modules.kernel("tree", "tree_leaves", &[Read, Write, Write])?,
+            tree_level: modules.kernel("tree", "tree_level", &[Read, Write, Write])?,
+            blocks: Array::new::<PointBox>("bounds of blocks of points"),
+            bounds: Array::new::<PointBox>("bounds of the points"),
             keys: [Array::new::<[u32; 2]>("sort keys"), Array::new::<[u32; 2]>("sort keys")],
             order: [Array::new::<u32>("sort order"), Array::new::<u32>("sort order")],
             counts: Array::new::<u32>("sort counts"),
             totals: Array::new::<u32>("sort totals"),
-            boxes: Array::new::<PointBox>("boxes of the tree over photons"),
+            boxes: Array::new::<PointBox>("boxes of the tree over points"),
+            nodes: Array::new::<TreeNode>("tree over points"),
             levels: Vec::new(),
         })
     }
@@ -98,7 +103,8 @@ impl Index {
         let digits = 1 << DIGIT_BITS;
         room(&mut self.counts, digits * n_blocks(n), digits * n_blocks(roomy))?;
         room(&mut self.totals, digits, digits)?;
-        room(&mut self.boxes, n_boxes(n), n_boxes(roomy))
+        room(&mut self.boxes, n_boxes(n), n_boxes(roomy))?;
+        room(&mut self.nodes, n_boxes(n) / 8 + 2, n_boxes(roomy) / 8 + 2)
     }
 
     /// Records the sort of `n` photons into `sorted`, and the tree over them. Call [`Index::reserve`] first.
@@ -110,10 +116,10 @@ impl Index {
         let n_blocks = n.div_ceil(BLOCK);
         let groups = n.div_ceil(THREADS);
         let bounds = [photons.all(), self.blocks.all(), self.bounds.all()];
-        batch.dispatch(&self.bounds_of_blocks, &bounds, [n, 0, 0, 0], n_blocks);
+        batch.dispatch(&self.bounds_of_blocks, &bounds, [n, WORDS, 0, 0], n_blocks);
         batch.dispatch(&self.bounds_of_all, &bounds, [n, 0, 0, 0], 1);
         let morton = [photons.all(), self.bounds.all(), self.keys[0].all(), self.order[0].all()];
-        batch.dispatch(&self.morton_keys, &morton, [n, 0, 0, 0], groups);
+        batch.dispatch(&self.morton_keys, &morton, [n, WORDS, 0, 0], groups);
 
         for pass in 0..N_PASSES {
             let (from, to) = ((pass % 2) as usize, (1 - pass % 2) as usize);
@@ -133,18 +139,18 @@ impl Index {
         let last = (N_PASSES % 2) as usize;
         batch.dispatch(&self.permute, &[self.order[last].all(), photons.all(), sorted.all()], [n, 0, 0, 0], groups);
 
-        let tree = [sorted.all(), self.boxes.all()];
-        batch.dispatch(&self.tree_leaves, &tree, [n, self.levels[0][1], 0, 0], self.levels[0][1].div_ceil(THREADS));
+        let tree = [sorted.all(), self.boxes.all(), self.nodes.all()];
+        batch.dispatch(&self.tree_leaves, &tree, [n, self.levels[0][1], WORDS, 0], self.levels[0][1].div_ceil(THREADS));
         for pair in self.levels.windows(2) {
             let ([below, n_below], [first, n]) = (pair[0], pair[1]);
-            batch.dispatch(&self.tree_level, &tree, [below, n_below, first, n], n.div_ceil(THREADS));
+            let arguments = self.arguments([below, n_below, first, n]);
+            batch.dispatch(&self.tree_level, &tree, arguments, n.div_ceil(THREADS));
         }
     }
 
-    /// The levels for a dispatch that walks the tree; `values[2]` becomes their number.
+    /// With the levels of the tree, which walks and builds of it read.
     pub(super) fn arguments(&self, values: [u32; 4]) -> Arguments {
         let mut arguments = Arguments::from(values);
-        arguments.values[2] = self.levels.len() as u32;
         for (to, from) in arguments.levels.iter_mut().zip(&self.levels) {
             *to = *from;
         }

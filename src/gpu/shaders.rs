@@ -4,6 +4,7 @@
 const LIBRARY: &[(&str, &str)] = &[
     ("layout", include_str!("../../shaders/layout.wgsl")),
     ("common", include_str!("../../shaders/lib/common.wgsl")),
+    ("frame", include_str!("../../shaders/lib/frame.wgsl")),
     ("oct", include_str!("../../shaders/lib/oct.wgsl")),
     ("rng", include_str!("../../shaders/lib/rng.wgsl")),
     ("basis", include_str!("../../shaders/lib/basis.wgsl")),
@@ -18,6 +19,7 @@ const LIBRARY: &[(&str, &str)] = &[
     ("bsdf_surface", include_str!("../../shaders/lib/bsdf_surface.wgsl")),
     ("light", include_str!("../../shaders/lib/light.wgsl")),
     ("camera", include_str!("../../shaders/lib/camera.wgsl")),
+    ("tree", include_str!("../../shaders/lib/tree.wgsl")),
     ("photon_paths", include_str!("../../shaders/lib/photon_paths.wgsl")),
 ];
 

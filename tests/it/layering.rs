@@ -3,14 +3,15 @@
 use std::path::Path;
 
 /// Each module with those it may use.
-const ALLOWED: [(&str, &[&str]); 8] = [
+const ALLOWED: [(&str, &[&str]); 9] = [
     ("math", &[]),
     ("index", &["math"]),
+    ("device", &["index"]),
     ("layout", &["index", "math"]),
     ("scene", &["layout", "index", "math"]),
-    ("ppm", &["scene", "layout", "index", "math"]),
-    ("cpu", &["ppm", "scene", "layout", "index", "math"]),
-    ("gpu", &["ppm", "scene", "layout", "index", "math"]),
+    ("ppm", &["scene", "layout", "device", "index", "math"]),
+    ("cpu", &["ppm", "scene", "layout", "device", "index", "math"]),
+    ("gpu", &["ppm", "scene", "layout", "device", "index", "math"]),
     ("output", &["ppm", "scene", "layout", "index", "math"]),
 ];
 

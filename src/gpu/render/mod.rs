@@ -1,15 +1,20 @@
 //! The stages of an iteration on a GPU.
 
+mod photons;
+mod probe;
+mod scene;
+
 use std::sync::Arc;
+
+use photons::PhotonPaths;
+pub use probe::{BsdfAnswer, BsdfQuery};
+use scene::SceneBuffers;
 
 use super::buffers::{Array, Readback};
 use super::context::Context;
 use super::index::Index;
 use super::kernels::{Access, Batch, Kernel, Modules, Shared};
-use super::photons::PhotonPaths;
-use super::probe::{self, BsdfAnswer, BsdfQuery};
-use super::scene::SceneBuffers;
-use super::timer::{Stage, Timer};
+use super::timer::Timer;
 use crate::layout::{Camera, EyeVertex, Frame, Photon, PointBox};
 use crate::ppm::{Error, Film, StageTimes, Stages};
 use crate::scene::PackedScene;
@@ -25,10 +30,19 @@ const MOST_PIXELS: u32 = 1 << 19;
 /// Seconds a dispatch may take, well below what watchdogs allow.
 const DISPATCH_SECONDS: f64 = 0.1;
 
+// The stages that are timed.
+const EYE: usize = 0;
+const PHOTONS: usize = 1;
+const BUILD: usize = 2;
+const GATHER: usize = 3;
+const ACCUMULATE: usize = 4;
+const N_STAGES: usize = 5;
+
 /// The GPU backend.
 pub struct GpuStages {
     context: Arc<Context>,
     shared: Shared,
+    scene: SceneBuffers,
     camera: Camera,
     trace_eye: Arc<Kernel>,
     paths: PhotonPaths,
@@ -43,7 +57,7 @@ pub struct GpuStages {
     /// The other half of a pair: photons before or after sorting.
     other_photons: Array,
     readback: Readback,
-    timer: Timer,
+    timer: Timer<N_STAGES>,
     n_pixels: u32,
     n_photons: u32,
     film_size: [u32; 2],
@@ -58,7 +72,8 @@ impl GpuStages {
     /// Puts the scene on the device.
     pub fn new(context: Arc<Context>, scene: &PackedScene, camera: Camera) -> Result<Self, Error> {
         use Access::{Read, Write};
-        let shared = Shared::new(&context, SceneBuffers::new(&context, scene, &camera)?);
+        let (scene, groups) = SceneBuffers::new(&context, scene, &camera)?;
+        let shared = Shared::new(&context, groups);
         let modules = Modules::new(&context, &shared);
         let trace_eye = modules.kernel("eye", "trace_eye", &[Write])?;
         let paths = PhotonPaths::new(&modules)?;
@@ -69,6 +84,7 @@ impl GpuStages {
         Ok(Self {
             context,
             shared,
+            scene,
             camera,
             trace_eye,
             paths,
@@ -169,9 +185,9 @@ impl Stages for GpuStages {
     fn trace_eye(&mut self, frame: &Frame) -> Result<(), Error> {
         let n_pixels = frame.width * frame.height;
         self.reserve_pixels(n_pixels)?;
-        self.shared.set_frame(&self.context, frame);
+        self.scene.set_frame(&self.context, frame);
         let mut batch = Batch::new(&self.context, &self.shared, "eye");
-        self.timer.begin(Stage::Eye, &mut batch);
+        self.timer.begin(EYE, &mut batch);
         for (first, rows) in Self::chunks(frame, self.eye_chunk) {
             if first > 0 {
                 batch.submit()?;
@@ -180,13 +196,14 @@ impl Stages for GpuStages {
             let buffers = [self.eye_vertices.range(first * frame.width, rows * frame.width)];
             batch.dispatch(&self.trace_eye, &buffers, [rows, first, 0, 0], tiles(frame.width, rows));
         }
-        self.timer.end(Stage::Eye, batch, &self.context)
+        self.timer.end(EYE, batch, &self.context)
     }
 
     fn trace_photons(&mut self, frame: &Frame) -> Result<(), Error> {
         self.n_photons = self.paths.trace(
             &self.context,
             &self.shared,
+            &self.scene,
             frame,
             &mut self.photons,
             &mut self.readback,
@@ -200,11 +217,11 @@ impl Stages for GpuStages {
         self.photons.reserve(&self.context, u64::from(n))?;
         self.other_photons.reserve(&self.context, self.photons.capacity())?;
         self.index.reserve(&self.context, n)?;
-        self.shared.set_frame(&self.context, frame);
+        self.scene.set_frame(&self.context, frame);
         let mut batch = Batch::new(&self.context, &self.shared, "build");
-        self.timer.begin(Stage::Build, &mut batch);
+        self.timer.begin(BUILD, &mut batch);
         self.index.build(&mut batch, n, &self.photons, &self.other_photons);
-        self.timer.end(Stage::Build, batch, &self.context)?;
+        self.timer.end(BUILD, batch, &self.context)?;
         std::mem::swap(&mut self.photons, &mut self.other_photons);
         Ok(())
     }
@@ -213,9 +230,9 @@ impl Stages for GpuStages {
         self.check_pixels(frame)?;
         self.index.reserve(&self.context, 0)?;
         self.photons.reserve(&self.context, 0)?;
-        self.shared.set_frame(&self.context, frame);
+        self.scene.set_frame(&self.context, frame);
         let mut batch = Batch::new(&self.context, &self.shared, "gather");
-        self.timer.begin(Stage::Gather, &mut batch);
+        self.timer.begin(GATHER, &mut batch);
         for (first, rows) in Self::chunks(frame, self.gather_chunk) {
             if first > 0 {
                 batch.submit()?;
@@ -226,20 +243,20 @@ impl Stages for GpuStages {
                 self.eye_vertices.range(first, n),
                 self.first_radii.range(first, n),
                 self.photons.all(),
-                self.index.boxes.all(),
+                self.index.nodes.all(),
                 self.radiance.range(first, n),
             ];
-            let arguments = self.index.arguments([rows, self.n_photons, 0, 0]);
+            let arguments = self.index.arguments([rows, self.n_photons, self.index.levels.len() as u32, 0]);
             batch.dispatch(&self.gather, &buffers, arguments, tiles(frame.width, rows));
         }
-        self.timer.end(Stage::Gather, batch, &self.context)
+        self.timer.end(GATHER, batch, &self.context)
     }
 
     fn accumulate(&mut self, frame: &Frame) -> Result<(), Error> {
         self.check_pixels(frame)?;
-        self.shared.set_frame(&self.context, frame);
+        self.scene.set_frame(&self.context, frame);
         let mut batch = Batch::new(&self.context, &self.shared, "accumulate");
-        self.timer.begin(Stage::Accumulate, &mut batch);
+        self.timer.begin(ACCUMULATE, &mut batch);
         if frame.iteration <= 1 {
             batch.encoder().clear_buffer(self.film.raw(), 0, None);
         }
@@ -248,7 +265,7 @@ impl Stages for GpuStages {
             let buffers = [self.radiance.range(first, n), self.film.range(first, n)];
             batch.dispatch(&self.accumulate, &buffers, [n, 0, 0, 0], n.div_ceil(THREADS));
         }
-        self.timer.end(Stage::Accumulate, batch, &self.context)?;
+        self.timer.end(ACCUMULATE, batch, &self.context)?;
         self.film_size = [frame.width, frame.height];
         self.n_iterations = frame.iteration;
         Ok(())
@@ -294,7 +311,9 @@ impl Stages for GpuStages {
     }
 
     fn times(&mut self) -> Result<StageTimes, Error> {
-        let times = self.timer.read(&self.context, &self.shared, &mut self.readback)?;
+        let [eye, photons, build, gather, accumulate] =
+            self.timer.read(&self.context, &self.shared, &mut self.readback)?;
+        let times = StageTimes { eye, photons, build, gather, accumulate };
         for (seconds, chunk) in [(times.eye, &mut self.eye_chunk), (times.gather, &mut self.gather_chunk)] {
             if seconds > 0.0 {
                 *chunk = (f64::from(self.n_pixels) * DISPATCH_SECONDS / seconds).min(f64::from(MOST_PIXELS)) as u32;
