@@ -1,5 +1,7 @@
 //! The command line: what may be typed, and what it means.
 
+pub mod points;
+
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -26,7 +28,8 @@ const EXAMPLES: &str = "\
 Examples:
   sunfleck render glass -o glass.png
   sunfleck render my.glb -o my.exr -o my.png --seconds 300 -r 1920x1080
-  sunfleck compare my.exr reference.exr";
+  sunfleck compare my.exr reference.exr
+  sunfleck points normals scan.ply -o normals.ply";
 
 const RENDER_EXAMPLES: &str = "\
 Examples:
@@ -68,6 +71,8 @@ pub enum Command {
     Compare(CompareArgs),
     /// Make the evaluation of the neighbour search again: figures and tables
     Bench(crate::bench::BenchArgs),
+    /// Geometry tasks on point clouds: normals, correspondence, registration
+    Points(points::PointsArgs),
 }
 
 #[derive(Debug, Args)]

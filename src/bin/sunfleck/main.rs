@@ -5,6 +5,7 @@ mod cli;
 mod compare;
 mod devices;
 mod job;
+mod points;
 mod progress;
 mod render;
 mod report;
@@ -39,6 +40,7 @@ fn main() -> ExitCode {
         (Some(Command::Export(args)), _) => scenes::export(args),
         (Some(Command::Compare(args)), _) => compare::run(args),
         (Some(Command::Bench(args)), _) => bench::run(args),
+        (Some(Command::Points(args)), _) => points::run(args),
         (None, _) => {
             eprintln!("{GREETING}");
             return ExitCode::from(cli::USAGE);

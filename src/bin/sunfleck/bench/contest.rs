@@ -88,8 +88,8 @@ pub struct Answer {
 /// An index that takes part, over points it was given before.
 pub trait Entrant {
     fn name(&self) -> &'static str;
-    /// Makes it ready for questions with `radius`.
-    fn build(&mut self, radius: f32) -> Result<()>;
+    /// Makes it ready for questions with `radius`, none of which has a query with more than `most` neighbours.
+    fn build(&mut self, radius: f32, most: usize) -> Result<()>;
     fn ask(&self, question: &Question<'_>) -> Result<Answer>;
     /// Frees what was built.
     fn forget(&mut self);
@@ -121,39 +121,44 @@ where
         self.name
     }
 
-    fn build(&mut self, radius: f32) -> Result<()> {
+    fn build(&mut self, radius: f32, _most: usize) -> Result<()> {
         self.index = Some((self.build)(radius)?);
         Ok(())
     }
 
     fn ask(&self, question: &Question<'_>) -> Result<Answer> {
         let Some(index) = &self.index else { bail!("{} was asked before it was built", self.name) };
-        let radii = Radii::One(question.radius);
-        let mut answer = Answer::default();
-        for queries in question.batches() {
-            match question.operation {
-                Operation::Sum => {
-                    let inverse = 1.0 / (question.radius * question.radius);
-                    let add = |state: &mut (u32, f32), _, d2: f32| *state = (state.0 + 1, state.1 + 1.0 - d2 * inverse);
-                    for (n, sum) in index.fold_all(queries, radii, |_| (0, 0.0), add)? {
-                        answer.neighbours += u64::from(n);
-                        answer.sum += f64::from(sum);
-                    }
-                }
-                Operation::Store => answer.neighbours += index.neighbours_all(queries, radii)?.indices.len() as u64,
-                Operation::Nearest(k) => {
-                    let lists = index.nearest_all(queries, radii, k)?;
-                    answer.neighbours += lists.found.iter().map(|&n| u64::from(n)).sum::<u64>();
-                    answer.sum += lists.distances2.iter().filter(|d| d.is_finite()).map(|&d| f64::from(d)).sum::<f64>();
-                }
-            }
-        }
-        Ok(answer)
+        answer(index, question)
     }
 
     fn forget(&mut self) {
         self.index = None;
     }
+}
+
+/// What an index says, in as many calls as the question has.
+pub fn answer(index: &impl RadiusSearch, question: &Question<'_>) -> Result<Answer> {
+    let radii = Radii::One(question.radius);
+    let mut answer = Answer::default();
+    for queries in question.batches() {
+        match question.operation {
+            Operation::Sum => {
+                let inverse = 1.0 / (question.radius * question.radius);
+                let add = |state: &mut (u32, f32), _, d2: f32| *state = (state.0 + 1, state.1 + 1.0 - d2 * inverse);
+                for (n, sum) in index.fold_all(queries, radii, |_| (0, 0.0), add)? {
+                    answer.neighbours += u64::from(n);
+                    answer.sum += f64::from(sum);
+                }
+            }
+            Operation::Store => answer.neighbours += index.neighbours_all(queries, radii)?.indices.len() as u64,
+            Operation::Nearest(k) => {
+                let lists = index.nearest_all(queries, radii, k)?;
+                answer.neighbours += lists.found.iter().map(|&n| u64::from(n)).sum::<u64>();
+                answer.sum += lists.distances2.iter().filter(|d| d.is_finite()).map(|&d| f64::from(d)).sum::<f64>();
+            }
+        }
+    }
+    Ok(answer)
 }
 
 /// What a run found of one entrant.
@@ -171,13 +176,14 @@ pub fn run(
     questions: &[Question<'_>],
     rounds: u32,
 ) -> Result<Vec<Score>> {
+    let most = questions.iter().map(|q| q.most).max().unwrap_or(0);
     let blank = Score { build: Times::default(), search: vec![Times::default(); questions.len()] };
     let mut scores = vec![blank; entrants.len()];
     // What the first entrant said, to compare the sums with.
     let mut first: Vec<Option<Answer>> = vec![None; questions.len()];
     for round in 0..=rounds {
         for (entrant, score) in entrants.iter_mut().zip(&mut scores) {
-            let (built, build) = timed(|| entrant.build(radius));
+            let (built, build) = timed(|| entrant.build(radius, most));
             built?;
             if round > 0 {
                 score.build.push(build);

@@ -104,7 +104,8 @@ fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
 pub fn curves(path: &Path, title: &str, panels: &[Curves], columns: usize) -> Result<()> {
     draw(path, title, panels, columns, |area, panel| {
         let all = || panel.series.iter().flat_map(|s| &s.points);
-        let (x, y) = (range(all().map(|p| p.0)), range(all().map(|p| p.1)));
+        let (x, mut y) = (range(all().map(|p| p.0)), range(all().map(|p| p.1)));
+        y.1 *= 8.0; // For the legend.
         let mut chart = ChartBuilder::on(area)
             .caption(&panel.title, ("sans-serif", 14))
             .margin(10)

@@ -22,14 +22,21 @@ impl Row {
         self
     }
 
+    /// The decimal that is meant, not the binary number nearest to it.
+    pub fn with_length(self, name: &str, length: f32) -> Self {
+        self.with(name, length.to_string().parse::<f64>().ok())
+    }
+
     /// Milliseconds, as `{name}Ms` (median) and `{name}MsMean`, `…Least`, `…Most`, and CPU milliseconds as `{name}CpuMs`.
     pub fn with_times(self, name: &str, times: &Times) -> Self {
         let Spread { median, mean, least, most } = times.wall();
-        self.with(&format!("{name}Ms"), 1e3 * median)
-            .with(&format!("{name}MsMean"), 1e3 * mean)
-            .with(&format!("{name}MsLeast"), 1e3 * least)
-            .with(&format!("{name}MsMost"), 1e3 * most)
-            .with(&format!("{name}CpuMs"), times.cpu().map(|cpu| 1e3 * cpu.median))
+        // To the nanosecond.
+        let ms = |seconds: f64| (seconds * 1e9).round() / 1e6;
+        self.with(&format!("{name}Ms"), ms(median))
+            .with(&format!("{name}MsMean"), ms(mean))
+            .with(&format!("{name}MsLeast"), ms(least))
+            .with(&format!("{name}MsMost"), ms(most))
+            .with(&format!("{name}CpuMs"), times.cpu().map(|cpu| ms(cpu.median)))
     }
 }
 

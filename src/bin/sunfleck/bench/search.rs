@@ -230,7 +230,7 @@ impl Cell {
             .with("density", self.density)
             .with("samples", self.samples)
             .with("queries", self.queries)
-            .with("radius", f64::from(self.radius))
+            .with_length("radius", self.radius)
             .with("index", self.index)
             .with("neighboursPerQuery", self.mean)
             .with("mostNeighbours", self.most)
