@@ -266,7 +266,7 @@ fn crop(text: &str) -> Result<Crop, String> {
     Ok(Crop([x0, x1, y0, y1]))
 }
 
-fn size(text: &str) -> Result<[u32; 2], String> {
+pub fn size(text: &str) -> Result<[u32; 2], String> {
     let (width, height) = text.split_once(['x', 'X', '×']).ok_or("a size looks like 1280x720")?;
     let side = |t: &str| match t.trim().parse() {
         Ok(n) if (1..=MAX_SIDE).contains(&n) => Ok(n),

@@ -63,7 +63,7 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode> {
 }
 
 /// Runs the pilot; for one radius everywhere, again with the median of what it chose.
-fn start(stages: &mut dyn Stages, params: &Params, one_radius: bool) -> Result<Vec<f32>> {
+pub fn start(stages: &mut dyn Stages, params: &Params, one_radius: bool) -> Result<Vec<f32>> {
     let radii = ppm::start(stages, params)?;
     if !one_radius {
         return Ok(radii);

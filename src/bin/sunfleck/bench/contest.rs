@@ -3,6 +3,7 @@
 use anyhow::{Result, bail, ensure};
 use glam::Vec3;
 use rayon::prelude::*;
+use sunfleck::index::stats::{Costs, Visits};
 use sunfleck::index::{self, BruteForce, PointBvh, Radii, RadiusSearch};
 
 use super::measure::{Times, timed};
@@ -76,6 +77,35 @@ impl<'a> Question<'a> {
     }
 }
 
+/// The radius at which the queries find `wanted` points on average, to 1 %; found with some of the queries.
+pub fn radius_for(points: &[Vec3], queries: &[Vec3], wanted: f64) -> Result<f32> {
+    const ASKED: usize = 20_000;
+    let some: Vec<Vec3> = queries.iter().copied().step_by(queries.len().div_ceil(ASKED).max(1)).collect();
+    let tree = PointBvh::new(points)?;
+    let mean = |radius: f32| -> Result<f64> {
+        let counts = tree.count_all(&some, Radii::One(radius))?;
+        Ok(counts.iter().map(|&n| f64::from(n)).sum::<f64>() / some.len().max(1) as f64)
+    };
+    let first = points.first().copied().unwrap_or_default();
+    let extent = points.iter().fold(Vec3::ZERO, |most, p| most.max((*p - first).abs())).max_element();
+    ensure!(extent > 0.0 && !some.is_empty(), "no radius finds {wanted} of {} points", points.len());
+    // From below: large radii take long to ask for.
+    let (mut low, mut high) = (0.0, extent * 1e-4);
+    while mean(high)? < wanted {
+        (low, high) = (high, 1.5 * high);
+        ensure!(high < 4.0 * extent, "no radius finds {wanted} of {} points", points.len());
+    }
+    for _ in 0..24 {
+        let middle = 0.5 * (low + high);
+        let found = mean(middle)?;
+        if (found / wanted - 1.0).abs() < 0.01 {
+            return Ok(middle);
+        }
+        (low, high) = if found < wanted { (middle, high) } else { (low, middle) };
+    }
+    Ok(high)
+}
+
 /// What an index found.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Answer {
@@ -91,8 +121,40 @@ pub trait Entrant {
     /// Makes it ready for questions with `radius`, none of which has a query with more than `most` neighbours.
     fn build(&mut self, radius: f32, most: usize) -> Result<()>;
     fn ask(&self, question: &Question<'_>) -> Result<Answer>;
+    /// What does not depend on the machine, told after building; nothing where the index does not tell.
+    fn anatomy(&self, _queries: &[Vec3], _radius: f32) -> Anatomy {
+        Anatomy::default()
+    }
     /// Frees what was built.
     fn forget(&mut self);
+}
+
+/// The cost of a search told without a clock.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Anatomy {
+    /// Means over queries.
+    pub visits: Option<Visited>,
+    pub costs: Option<Costs>,
+}
+
+/// What one query visits, on average.
+#[derive(Clone, Copy, Debug)]
+pub struct Visited {
+    pub nodes: f64,
+    pub boxes: f64,
+    pub points: f64,
+}
+
+impl Visited {
+    /// Of what each query visits.
+    pub fn mean(all: impl ExactSizeIterator<Item = Visits>) -> Self {
+        let n = all.len().max(1) as f64;
+        let sum = all.fold(Visits::default(), |mut sum, visits| {
+            sum += visits;
+            sum
+        });
+        Self { nodes: sum.nodes as f64 / n, boxes: sum.boxes as f64 / n, points: sum.points as f64 / n }
+    }
 }
 
 /// Anything that implements the trait, and how to make it for a radius.
@@ -100,6 +162,7 @@ pub struct Of<I, B> {
     name: &'static str,
     build: B,
     index: Option<I>,
+    describe: fn(&I, &[Vec3], f32) -> Anatomy,
 }
 
 impl<I, B> Of<I, B>
@@ -108,7 +171,12 @@ where
     B: Fn(f32) -> Result<I, index::Error>,
 {
     pub fn new(name: &'static str, build: B) -> Self {
-        Self { name, build, index: None }
+        Self { name, build, index: None, describe: |_, _, _| Anatomy::default() }
+    }
+
+    /// With what tells its anatomy.
+    pub fn described(self, describe: fn(&I, &[Vec3], f32) -> Anatomy) -> Self {
+        Self { describe, ..self }
     }
 }
 
@@ -129,6 +197,10 @@ where
     fn ask(&self, question: &Question<'_>) -> Result<Answer> {
         let Some(index) = &self.index else { bail!("{} was asked before it was built", self.name) };
         answer(index, question)
+    }
+
+    fn anatomy(&self, queries: &[Vec3], radius: f32) -> Anatomy {
+        self.index.as_ref().map_or(Anatomy::default(), |index| (self.describe)(index, queries, radius))
     }
 
     fn forget(&mut self) {
@@ -248,6 +320,18 @@ mod tests {
             let error = run(&mut [tree(), lossy], 0.1, &[question], 1).unwrap_err().to_string();
             assert!(error.contains("lossy found"), "{error}");
         }
+    }
+
+    #[test]
+    fn radii_are_tuned() {
+        let points = clouds::uniform(4000, 2);
+        for wanted in [1.0, 8.0, 50.0] {
+            let radius = radius_for(&points, &points, wanted).unwrap();
+            let question = Question::new(&points, &points, radius, Operation::Sum).unwrap();
+            assert!((question.mean() / wanted - 1.0).abs() < 0.02, "{}", question.mean());
+        }
+        assert!(radius_for(&points, &points, 5000.0).is_err());
+        assert!(radius_for(&points[..1], &points, 1.0).is_err());
     }
 
     #[test]

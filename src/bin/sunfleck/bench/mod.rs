@@ -12,10 +12,15 @@
 
 mod contest;
 mod entrants;
+mod gathers;
+mod indices;
 mod measure;
+mod photons;
 mod plot;
+mod points;
 mod report;
 mod search;
+mod sorted;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -39,6 +44,9 @@ Examples:
   sunfleck bench search --threads 1 --rounds 9 -o results
       All of it, which takes its time.
 
+  sunfleck bench photons --iterations 5 -o results
+      The paper's Table 1 on this machine; its 50 iterations take hours without a GPU.
+
 Into the folder go NAME.json, NAME.csv and an .svg for each figure; the tables are printed too.";
 
 #[derive(Debug, Args)]
@@ -53,6 +61,12 @@ pub struct BenchArgs {
 enum Benchmark {
     /// Radius search on uniform and on clustered points (Figures 3 to 6 of the paper)
     Search(search::SearchArgs),
+    /// Nearest neighbours in point clouds (Figure 7 of the paper)
+    Points(points::PointsArgs),
+    /// Build and gather of photons in four scenes (Figure 9 and Table 1 of the paper)
+    Photons(photons::PhotonsArgs),
+    /// The library's indices and build options side by side
+    Indices(indices::IndicesArgs),
 }
 
 /// What all benchmarks understand.
@@ -65,10 +79,6 @@ struct Common {
     /// Smaller and in less than a minute: to see that it works
     #[arg(long)]
     quick: bool,
-
-    /// Rounds that count, after one that does not
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    rounds: u32,
 
     /// CPU threads [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -83,9 +93,19 @@ struct Common {
     quiet: bool,
 }
 
+#[derive(Debug, Args)]
+struct Rounds {
+    /// Rounds that count, after one that does not
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    rounds: u32,
+}
+
 pub fn run(args: &BenchArgs) -> Result<ExitCode> {
     match &args.benchmark {
         Benchmark::Search(args) => search::run(args)?,
+        Benchmark::Points(args) => points::run(args)?,
+        Benchmark::Photons(args) => photons::run(args)?,
+        Benchmark::Indices(args) => indices::run(args)?,
     }
     Ok(ExitCode::SUCCESS)
 }

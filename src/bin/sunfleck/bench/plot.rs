@@ -259,6 +259,36 @@ pub fn bars(path: &Path, title: &str, panels: &[Bars], columns: usize) -> Result
     })
 }
 
+/// Horizontal bars, a line for each bar: for long names.
+pub fn rows(path: &Path, title: &str, panels: &[Bars]) -> Result<()> {
+    draw(path, title, panels, 2, |area, panel| {
+        let bars: Vec<(&str, &[f64])> =
+            panel.groups.iter().flat_map(|g| g.1.iter().map(|bar| (g.0.as_str(), bar.1.as_slice()))).collect();
+        let total = |heights: &[f64]| heights.iter().filter(|h| h.is_finite()).sum::<f64>();
+        let most = bars.iter().map(|bar| total(bar.1)).fold(1e-9, f64::max);
+        let area = area.titled(&format!("{}, {}", panel.title, panel.y), ("sans-serif", 14)).map_err(failed)?;
+        let (width, height) = (area.dim_in_pixel().0 as i32, area.dim_in_pixel().1 as i32);
+        let (left, right) = (178, width - 60);
+        let pitch = height / (bars.len() as i32 + 1).max(1);
+        let font = |h| ("sans-serif", 11).into_font().color(&BLACK).pos(Pos::new(h, VPos::Center));
+        for (i, (name, lengths)) in (0..).zip(&bars) {
+            let (top, bottom) = (i * pitch + 2, (i + 1) * pitch - 2);
+            let middle = (top + bottom) / 2;
+            area.draw(&Text::new((*name).to_owned(), (left - 6, middle), font(HPos::Right))).map_err(failed)?;
+            let x = |value: f64| left + (f64::from(right - left) * value / most) as i32;
+            let mut base = 0.0;
+            for (part, &length) in lengths.iter().enumerate().filter(|(_, l)| l.is_finite()) {
+                let style = COLOURS[0].mix(if part == 0 { 1.0 } else { 0.45 }).filled();
+                let corners = [(x(base), top), (x(base + length), bottom)];
+                area.draw(&Rectangle::new(corners, style)).map_err(failed)?;
+                base += length;
+            }
+            area.draw(&Text::new(figure(base), (x(base) + 4, middle), font(HPos::Left))).map_err(failed)?;
+        }
+        Ok(())
+    })
+}
+
 /// For an axis.
 fn short(x: f64) -> String {
     match x.abs() {

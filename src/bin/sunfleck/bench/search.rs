@@ -25,7 +25,7 @@ use super::contest::{self, Operation, Question, Score};
 use super::entrants::{self, DEFAULT, METHOD, RIVAL};
 use super::plot::{self, Curves, Map, Series};
 use super::report::{self, Machine, Report, Row};
-use super::{Common, count, length, short};
+use super::{Common, PAPER_DEVICE, Rounds, count, length, short};
 
 const NOTES: &[&str] = &[
     "operation: all neighbours of every query are stored with their squared distances",
@@ -37,6 +37,9 @@ const NOTES: &[&str] = &[
 pub struct SearchArgs {
     #[command(flatten)]
     common: Common,
+
+    #[command(flatten)]
+    rounds: Rounds,
 
     /// Numbers of samples, instead of the paper's low and high density
     #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = count)]
@@ -257,7 +260,7 @@ pub fn run(args: &SearchArgs) -> Result<()> {
                     .map(|&n| Question::new(samples, &queries[..n], radius, Operation::Store))
                     .collect::<Result<Vec<_>>>()?;
                 let mut entrants = entrants::radius_search(samples);
-                let scores = contest::run(&mut entrants, radius, &questions, common.rounds)?;
+                let scores = contest::run(&mut entrants, radius, &questions, args.rounds.rounds)?;
                 for (entrant, score) in entrants.iter().zip(scores) {
                     cells.extend(questions.iter().zip(score.search).map(|(question, search)| Cell {
                         distribution,
@@ -296,7 +299,7 @@ pub fn run(args: &SearchArgs) -> Result<()> {
         machine: Machine::here(vec![]),
         settings: json!({
             "quick": common.quick,
-            "rounds": common.rounds,
+            "rounds": args.rounds.rounds,
             "seed": common.seed,
             "distributions": plan.distributions.iter().map(|d| d.name()).collect::<Vec<_>>(),
         }),
@@ -407,7 +410,7 @@ fn print(machine: &Machine, plan: &Plan, cells: &[Cell]) {
                 distribution.name(),
                 machine.line(),
                 report::table(&header, 0, lines),
-                super::PAPER_DEVICE,
+                PAPER_DEVICE,
             ));
         }
     }
