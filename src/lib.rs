@@ -1,7 +1,7 @@
 //! Sunfleck: progressive photon mapping, and the neighbour search under it.
 //!
-//! Import order, left never names right: `math` → `index` → `device` | `points` → `layout` → `scene` → `ppm` → `cpu` | `gpu`
-//! → `output`.
+//! Import order, left never names right: `math` → `index` → `points` → `device` → `layout` → `scene` → `ppm` → `cpu` |
+//! `gpu` → `output`.
 //! `cpu` and `gpu` do not know each other.
 
 #[cfg(feature = "render")]

@@ -48,11 +48,7 @@ pub fn gaussian_modes(n: usize, seed: u32) -> Vec<Vec3> {
         let [u, v, w, t] = unit4(draw(Set::Modes, i, 1, seed));
         // Box & Muller 1958; 1 − u is in (0, 1].
         let radius = |u: f32| (-2.0 * (1.0 - u).ln()).sqrt();
-        let normal = Vec3::new(
-            radius(u) * (TAU * v).cos(),
-            radius(u) * (TAU * v).sin(),
-            radius(w) * (TAU * t).cos(),
-        );
+        let normal = Vec3::new(radius(u) * (TAU * v).cos(), radius(u) * (TAU * v).sin(), radius(w) * (TAU * t).cos());
         mode_centre((mode >> 29) as usize) + MODE_SIGMA * normal
     };
     (0..n).map(point).collect()

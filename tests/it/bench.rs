@@ -197,7 +197,13 @@ fn indices_tell_times_visits_and_costs() {
         assert_times(row, "search");
         let (case, index) = (row["case"].as_str().unwrap(), row["index"].as_str().unwrap());
         let mean = number(row, "neighboursPerQuery");
-        let wanted = if case == "nearest" { 7.0..8.01 } else if case == "uniform" { 25.0..34.0 } else { 48.0..52.0 };
+        let wanted = if case == "nearest" {
+            7.0..8.01
+        } else if case == "uniform" {
+            25.0..34.0
+        } else {
+            48.0..52.0
+        };
         assert!(wanted.contains(&mean), "{case}, {index}: {mean}");
         if let (Some(sah), Some(vh)) = (row["sah"].as_f64(), row["vh"].as_f64()) {
             assert!(sah >= vh && vh > 0.0, "the proof of the paper's appendix: {row}");
@@ -249,8 +255,11 @@ fn eight_modes_are_equal_spherical_and_normal() {
     let points = clouds::gaussian_modes(n, 5);
     let nearest = |p: &Vec3| (0..8).min_by_key(|&k| (p.distance(clouds::mode_centre(k)) * 1e6) as u32).unwrap();
     for k in 0..8 {
-        let offsets: Vec<Vec3> =
-            points.iter().filter(|p| nearest(p) == k).map(|p| (*p - clouds::mode_centre(k)) / clouds::MODE_SIGMA).collect();
+        let offsets: Vec<Vec3> = points
+            .iter()
+            .filter(|p| nearest(p) == k)
+            .map(|p| (*p - clouds::mode_centre(k)) / clouds::MODE_SIGMA)
+            .collect();
         // n/8 ± 5 standard deviations.
         assert!((offsets.len() as f32 - n as f32 / 8.0).abs() < 5.0 * (n as f32 * 7.0 / 64.0).sqrt());
         for axis in 0..3 {

@@ -51,7 +51,10 @@ impl<'a> Question<'a> {
             .step_by(step)
             .find_any(|&q| oracle.count(queries[q], radius) != counts[q] as usize);
         if let Some(q) = wrong {
-            bail!("the reference is wrong: query {q} has {} neighbours by brute force", oracle.count(queries[q], radius));
+            bail!(
+                "the reference is wrong: query {q} has {} neighbours by brute force",
+                oracle.count(queries[q], radius)
+            );
         }
         let most = counts.iter().copied().max().unwrap_or(0) as usize;
         let cap = match operation {

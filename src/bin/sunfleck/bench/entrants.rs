@@ -5,10 +5,10 @@ use std::ops::ControlFlow;
 use anyhow::{Result, bail};
 use glam::Vec3;
 use rayon::prelude::*;
-use sunfleck::index::stats::{CountVisits, CountedPointBvh, Costs, Weights};
+use sunfleck::index::stats::{Costs, CountVisits, CountedPointBvh, Weights};
 use sunfleck::index::{
-    Boxes, BruteForce, Buffers, Builder, HashGrid, KdBuffered, KdTree, Nearest, PointBvh, QueryOrder, Radii, RadiusSearch,
-    SampleBvh, SampleOptions, queries_as_boxes,
+    Boxes, BruteForce, Buffers, Builder, HashGrid, KdBuffered, KdTree, Nearest, PointBvh, QueryOrder, Radii,
+    RadiusSearch, SampleBvh, SampleOptions, queries_as_boxes,
 };
 
 use super::contest::{self, Anatomy, Answer, Entrant, Of, Operation, Question, Visited};
@@ -36,7 +36,13 @@ type Boxed<'a> = Box<dyn Entrant + 'a>;
 
 /// Those of Figures 3 to 6.
 pub fn radius_search(points: &[Vec3]) -> Vec<Boxed<'_>> {
-    vec![default(points), samples(METHOD, points, PLOC, true, 1), rival(points), kd(points), grid("grid", points, QueryOrder::Auto)]
+    vec![
+        default(points),
+        samples(METHOD, points, PLOC, true, 1),
+        rival(points),
+        kd(points),
+        grid("grid", points, QueryOrder::Auto),
+    ]
 }
 
 /// Those of Figure 7.
@@ -107,7 +113,13 @@ fn grid<'a>(name: &'static str, points: &'a [Vec3], query_order: QueryOrder) -> 
 }
 
 /// A binary tree over the samples' boxes.
-fn samples<'a>(name: &'static str, points: &'a [Vec3], builder: Builder, inflated: bool, leaf_size: usize) -> Boxed<'a> {
+fn samples<'a>(
+    name: &'static str,
+    points: &'a [Vec3],
+    builder: Builder,
+    inflated: bool,
+    leaf_size: usize,
+) -> Boxed<'a> {
     let describe = |tree: &SampleBvh, queries: &[Vec3], radius: f32| {
         // Inflated boxes have grown already.
         let grow = if tree.max_radius().is_finite() { 0.0 } else { radius };

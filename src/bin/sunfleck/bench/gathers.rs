@@ -4,9 +4,7 @@ use anyhow::{Result, ensure};
 use glam::Vec3;
 use rayon::prelude::*;
 use sunfleck::cpu::gather::Estimate;
-use sunfleck::index::{
-    Boxes, Buffers, Builder, KdBuffered, PointBvh, Radii, RadiusSearch, SampleBvh, SampleOptions,
-};
+use sunfleck::index::{Boxes, Buffers, Builder, KdBuffered, PointBvh, Radii, RadiusSearch, SampleBvh, SampleOptions};
 use sunfleck::layout::{EYE_GATHER, EyeVertex, Frame, Photon};
 use sunfleck::scene::PackedScene;
 
@@ -128,6 +126,9 @@ pub fn check(name: &str, found: &[Vec3], right: &[[f32; 3]]) -> Result<()> {
     let sum = |values: &mut dyn Iterator<Item = f32>| values.map(f64::from).sum::<f64>();
     let all = sum(&mut right.iter().flatten().map(|c| c.abs()));
     let off = sum(&mut found.iter().zip(right).map(|(a, b)| (*a - Vec3::from(*b)).abs().element_sum()));
-    ensure!(found.len() == right.len() && off <= 1e-4 * all, "{name} gathered something else than the renderer: {off} of {all}");
+    ensure!(
+        found.len() == right.len() && off <= 1e-4 * all,
+        "{name} gathered something else than the renderer: {off} of {all}"
+    );
     Ok(())
 }

@@ -116,7 +116,12 @@ pub fn run(args: &IndicesArgs) -> Result<()> {
     let mut cells = Vec::new();
     for name in &names {
         let case = Case::new(name, args)?;
-        steps.next(&format!("{}, {} samples, {} queries", case.name, short(case.points.len()), short(case.queries.len())));
+        steps.next(&format!(
+            "{}, {} samples, {} queries",
+            case.name,
+            short(case.points.len()),
+            short(case.queries.len())
+        ));
         let question = Question::new(&case.points, &case.queries, case.radius, case.operation)?;
         let mut entrants = entrants::ablations(&case.points, &question);
         let scores = contest::run(&mut entrants, case.radius, std::slice::from_ref(&question), args.rounds.rounds)?;
@@ -211,9 +216,8 @@ fn draw(path: &std::path::Path, names: &[&str], cells: &[Cell]) -> Result<()> {
 }
 
 fn print(machine: &Machine, names: &[&str], cells: &[Cell]) {
-    let header = [
-        "index", "build ms", "search ms", "search CPU ms", "ns/query", "nodes", "boxes", "points", "SAH", "VH",
-    ];
+    let header =
+        ["index", "build ms", "search ms", "search CPU ms", "ns/query", "nodes", "boxes", "points", "SAH", "VH"];
     for name in names {
         let of = || cells.iter().filter(|c| c.case == *name);
         let Some(first) = of().next() else { continue };

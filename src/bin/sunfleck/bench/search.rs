@@ -331,18 +331,23 @@ fn draw_maps(path: &std::path::Path, distribution: Distribution, plan: &Plan, ce
     let columns = plan.densities.iter().map(|d| d.radii.len()).max().unwrap_or(1);
     for index in [METHOD, DEFAULT] {
         for density in &plan.densities {
-            let of = |samples, queries, radius, index| find(cells, figure, index, density.name, (samples, queries, radius));
-            panels.extend(density.radii.iter().map(|&radius| Map {
-                title: format!("{index}, {} density, radius {radius}", density.name),
-                x: "samples",
-                y: "queries",
-                columns: density.samples.iter().copied().map(short).collect(),
-                rows: density.queries.iter().copied().map(short).collect(),
-                ratios: density
-                    .queries
-                    .iter()
-                    .map(|&q| density.samples.iter().map(|&s| of(s, q, radius, RIVAL) / of(s, q, radius, index)).collect())
-                    .collect(),
+            let of =
+                |samples, queries, radius, index| find(cells, figure, index, density.name, (samples, queries, radius));
+            panels.extend(density.radii.iter().map(|&radius| {
+                Map {
+                    title: format!("{index}, {} density, radius {radius}", density.name),
+                    x: "samples",
+                    y: "queries",
+                    columns: density.samples.iter().copied().map(short).collect(),
+                    rows: density.queries.iter().copied().map(short).collect(),
+                    ratios: density
+                        .queries
+                        .iter()
+                        .map(|&q| {
+                            density.samples.iter().map(|&s| of(s, q, radius, RIVAL) / of(s, q, radius, index)).collect()
+                        })
+                        .collect(),
+                }
             }));
         }
     }
@@ -386,7 +391,8 @@ fn print(machine: &Machine, plan: &Plan, cells: &[Cell]) {
                     indices.push(cell.index);
                 }
                 let same = |c: &Cell| {
-                    (c.density, c.samples, c.queries, c.radius) == (cell.density, cell.samples, cell.queries, cell.radius)
+                    (c.density, c.samples, c.queries, c.radius)
+                        == (cell.density, cell.samples, cell.queries, cell.radius)
                 };
                 let times = format!("{} / {}", build(cell), report::figure(cell.search_ms()));
                 match rows.iter_mut().find(|(c, _)| same(c)) {
@@ -395,7 +401,8 @@ fn print(machine: &Machine, plan: &Plan, cells: &[Cell]) {
                 }
             }
             let is_map = figure % 2 == 1;
-            let shown = rows.into_iter().filter(|(c, _)| !is_map || c.queries == c.samples || plan.densities.len() == 1);
+            let shown =
+                rows.into_iter().filter(|(c, _)| !is_map || c.queries == c.samples || plan.densities.len() == 1);
             let lines = shown.map(|(cell, columns)| {
                 let mut line = vec![short(cell.samples), short(cell.queries), cell.radius.to_string()];
                 line.push(report::figure(cell.mean));
