@@ -20,6 +20,7 @@ const LIBRARY: &[(&str, &str)] = &[
     ("light", include_str!("../../shaders/lib/light.wgsl")),
     ("camera", include_str!("../../shaders/lib/camera.wgsl")),
     ("tree", include_str!("../../shaders/lib/tree.wgsl")),
+    ("search", include_str!("../../shaders/lib/search.wgsl")),
     ("photon_paths", include_str!("../../shaders/lib/photon_paths.wgsl")),
 ];
 
@@ -35,6 +36,10 @@ const MODULES: &[(&str, &str)] = &[
     ("sort", include_str!("../../shaders/sort.wgsl")),
     ("permute", include_str!("../../shaders/permute.wgsl")),
     ("tree", include_str!("../../shaders/tree.wgsl")),
+    ("points", include_str!("../../shaders/points.wgsl")),
+    ("neighbours", include_str!("../../shaders/neighbours.wgsl")),
+    ("scan", include_str!("../../shaders/scan.wgsl")),
+    ("nearest", include_str!("../../shaders/nearest.wgsl")),
     ("gather", include_str!("../../shaders/gather.wgsl")),
     ("accumulate", include_str!("../../shaders/accumulate.wgsl")),
 ];

@@ -12,7 +12,7 @@ use scene::SceneBuffers;
 
 use super::buffers::{Array, Readback};
 use super::context::Context;
-use super::index::Index;
+use super::index::{Index, Sorted};
 use super::kernels::{Access, Batch, Kernel, Modules, Shared};
 use super::timer::Timer;
 use crate::layout::{Camera, EyeVertex, Frame, Photon, PointBox};
@@ -21,6 +21,8 @@ use crate::scene::PackedScene;
 
 /// Threads a workgroup.
 const THREADS: u32 = 64;
+/// Words of a photon, whose position comes first.
+const PHOTON_WORDS: u32 = (size_of::<Photon>() / 4) as u32;
 /// The film is cut at multiples of this many rows, so that the address of any part of a per-pixel array is aligned.
 const ROW_STEP: u32 = 64;
 /// Pixels of the first dispatches, before anything is known about the device's speed.
@@ -77,7 +79,7 @@ impl GpuStages {
         let modules = Modules::new(&context, &shared);
         let trace_eye = modules.kernel("eye", "trace_eye", &[Write])?;
         let paths = PhotonPaths::new(&modules)?;
-        let index = Index::new(&modules)?;
+        let index = Index::new(&modules, &Sorted { permute: ("permute", "permute"), words: PHOTON_WORDS })?;
         let gather = modules.kernel("gather", "gather", &[Read, Read, Read, Read, Write])?;
         let accumulate = modules.kernel("accumulate", "accumulate", &[Read, Write])?;
         let timer = Timer::new(&context);
@@ -220,7 +222,7 @@ impl Stages for GpuStages {
         self.scene.set_frame(&self.context, frame);
         let mut batch = Batch::new(&self.context, &self.shared, "build");
         self.timer.begin(BUILD, &mut batch);
-        self.index.build(&mut batch, n, &self.photons, &self.other_photons);
+        self.index.build(&mut batch, n, &self.photons.all(), PHOTON_WORDS, &self.other_photons);
         self.timer.end(BUILD, batch, &self.context)?;
         std::mem::swap(&mut self.photons, &mut self.other_photons);
         Ok(())
