@@ -98,6 +98,16 @@ pub(super) fn storage(access: Access) -> wgpu::BindingType {
     }
 }
 
+impl From<Access> for wgpu::BindingType {
+    fn from(access: Access) -> Self {
+        storage(access)
+    }
+}
+
+/// What ray queries search.
+pub(super) const ACCELERATION_STRUCTURE: wgpu::BindingType =
+    wgpu::BindingType::AccelerationStructure { vertex_return: false };
+
 /// What all kernels share. Bind group 0 is a kernel's own, 1 holds the arguments of the dispatch, those after it are the
 /// user's: a kernel sees them if its text names `@group(2)`, or `@group(3)`.
 pub(super) struct Shared {
@@ -122,8 +132,8 @@ impl Shared {
     }
 }
 
-/// The kernels of one device; each is made once.
-pub(super) type Cache = Mutex<HashMap<&'static str, Arc<Kernel>>>;
+/// The kernels of one device by module and entry point; each is made once.
+pub(super) type Cache = Mutex<HashMap<(&'static str, &'static str), Arc<Kernel>>>;
 
 /// Makes kernels.
 pub(super) struct Modules<'a> {
@@ -138,17 +148,27 @@ impl<'a> Modules<'a> {
 
     /// The entry point `name` of `module`, whose storage buffers are used as `accesses` says, in the order of their
     /// bindings.
-    pub(super) fn kernel(&self, module: &str, name: &'static str, accesses: &[Access]) -> Result<Arc<Kernel>, Error> {
+    pub(super) fn kernel(
+        &self,
+        module: &'static str,
+        name: &'static str,
+        accesses: &[impl Copy + Into<wgpu::BindingType>],
+    ) -> Result<Arc<Kernel>, Error> {
         let mut known = self.context.kernels.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        if let Some(kernel) = known.get(name) {
+        if let Some(kernel) = known.get(&(module, name)) {
             return Ok(Arc::clone(kernel));
         }
         let kernel = Arc::new(self.build(module, name, accesses)?);
-        known.insert(name, Arc::clone(&kernel));
+        known.insert((module, name), Arc::clone(&kernel));
         Ok(kernel)
     }
 
-    fn build(&self, module: &str, name: &'static str, accesses: &[Access]) -> Result<Kernel, Error> {
+    fn build(
+        &self,
+        module: &str,
+        name: &'static str,
+        accesses: &[impl Copy + Into<wgpu::BindingType>],
+    ) -> Result<Kernel, Error> {
         let device = &self.context.device;
         let source = shaders::source(module);
         let n_groups = (1..4).rev().find(|n| source.contains(&format!("@group({n})"))).unwrap_or(0);
@@ -162,7 +182,7 @@ impl<'a> Modules<'a> {
                 .map(|(binding, &access)| wgpu::BindGroupLayoutEntry {
                     binding,
                     visibility: wgpu::ShaderStages::COMPUTE,
-                    ty: storage(access),
+                    ty: access.into(),
                     count: None,
                 })
                 .collect();
