@@ -7,6 +7,7 @@ mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
 mod index;
+mod indices;
 mod layering;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod layout;

@@ -1,5 +1,7 @@
 //! The command line: what may be typed, and what it means.
 
+pub mod points;
+
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -26,7 +28,8 @@ const EXAMPLES: &str = "\
 Examples:
   sunfleck render glass -o glass.png
   sunfleck render my.glb -o my.exr -o my.png --seconds 300 -r 1920x1080
-  sunfleck compare my.exr reference.exr";
+  sunfleck compare my.exr reference.exr
+  sunfleck points normals scan.ply -o normals.ply";
 
 const RENDER_EXAMPLES: &str = "\
 Examples:
@@ -66,6 +69,8 @@ pub enum Command {
     #[command(after_help = "relMSE is the mean over pixels and channels of (x - y)² / (y² + 0.01); \
         the trimmed one leaves out the worst 0.1 % of the pixels.")]
     Compare(CompareArgs),
+    /// Geometry tasks on point clouds: normals, correspondence, registration
+    Points(points::PointsArgs),
 }
 
 #[derive(Debug, Args)]
