@@ -7,10 +7,17 @@ mod index;
 mod kernels;
 #[cfg(feature = "render")]
 mod render;
+mod search;
 pub mod shaders;
 mod timer;
 
-pub use context::{Choice, Context, DeviceInfo, DeviceKind, list_devices};
+pub use context::{Choice, Context, DeviceInfo, DeviceKind, list_devices, required_limits};
+pub use kernels::Access;
+#[cfg(feature = "render")]
+pub use render::{BsdfAnswer, BsdfQuery, GpuStages};
+pub use search::{
+    DeviceArray, DeviceNearest, DeviceNeighbours, PointSearch, Queries, QueryRadii, SearchTimes, Visitor,
+};
 
 /// How neighbours are found on the GPU.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,5 +37,3 @@ impl std::fmt::Display for Method {
         })
     }
 }
-#[cfg(feature = "render")]
-pub use render::{BsdfAnswer, BsdfQuery, GpuStages};

@@ -21,6 +21,7 @@ const LIBRARY: &[(&str, &str)] = &[
     ("camera", include_str!("../../shaders/lib/camera.wgsl")),
     ("tree", include_str!("../../shaders/lib/tree.wgsl")),
     ("hardware", include_str!("../../shaders/lib/hardware.wgsl")),
+    ("search", include_str!("../../shaders/lib/search.wgsl")),
     ("photon_paths", include_str!("../../shaders/lib/photon_paths.wgsl")),
 ];
 
@@ -37,13 +38,20 @@ const MODULES: &[(&str, &str)] = &[
     ("permute", include_str!("../../shaders/permute.wgsl")),
     ("tree", include_str!("../../shaders/tree.wgsl")),
     ("inflate", include_str!("../../shaders/inflate.wgsl")),
+    ("points", include_str!("../../shaders/points.wgsl")),
+    ("neighbours", include_str!("../../shaders/neighbours.wgsl")),
+    ("scan", include_str!("../../shaders/scan.wgsl")),
+    ("nearest", include_str!("../../shaders/nearest.wgsl")),
     ("gather", include_str!("../../shaders/gather.wgsl")),
     ("accumulate", include_str!("../../shaders/accumulate.wgsl")),
 ];
 
 /// Modules that walk the tree and can search by ray queries instead: they have a second name, which ends in
 /// [`HARDWARE`].
-const WITH_HARDWARE: &[&str] = &["gather_hardware"];
+const WITH_HARDWARE: &[&str] = &["gather_hardware", "neighbours_hardware", "nearest_hardware"];
+
+/// How a text begins that uses ray queries.
+pub const ENABLE_RAY_QUERIES: &str = "enable wgpu_ray_query; ";
 
 /// What that name ends in.
 const HARDWARE: &str = "_hardware";
@@ -65,7 +73,7 @@ pub fn needs_ray_queries(module: &str) -> bool {
 pub fn source(module: &str) -> String {
     let base = if needs_ray_queries(module) { module.trim_end_matches(HARDWARE) } else { module };
     let (_, text) = MODULES.iter().find(|(name, _)| *name == base).expect("a module of this crate");
-    if base == module { compose(text) } else { compose_for_hardware(text) }
+    if base == module { compose(text) } else { ENABLE_RAY_QUERIES.to_owned() + &compose_for_hardware(text) }
 }
 
 /// Replaces the imports of a text by what they name, each one once.
@@ -79,12 +87,12 @@ pub fn compose(text: &str) -> String {
 }
 
 /// The same for a text whose `tree` is to be searched by ray queries: that declaration and the import of its walk are
-/// exchanged, nothing else, so that whatever visits points runs on either.
+/// exchanged, nothing else, so that whatever visits points runs on either. [`ENABLE_RAY_QUERIES`] has to come first.
 ///
 /// # Panics
 /// If it imports what does not exist.
 pub fn compose_for_hardware(text: &str) -> String {
-    let mut composed = "enable wgpu_ray_query;\n".to_owned();
+    let mut composed = String::new();
     append(text, true, &mut Vec::new(), &mut composed);
     composed.replace("var<storage, read> tree: array<TreeNode>;", "var tree: acceleration_structure;")
 }

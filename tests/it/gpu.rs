@@ -10,21 +10,7 @@ use sunfleck::math::{morton, oct, rng};
 use sunfleck::ppm::{Error, Stages, film};
 use sunfleck::scene::PackedScene;
 
-/// The device that all tests share; `None` without an adapter.
-pub fn context() -> Option<Arc<Context>> {
-    static CONTEXT: OnceLock<Option<Arc<Context>>> = OnceLock::new();
-    let opened = CONTEXT.get_or_init(|| match Context::new(&Choice::Any) {
-        Ok(context) => Some(Arc::new(context)),
-        Err(error) => {
-            assert!(std::env::var_os("SUNFLECK_REQUIRE_GPU").is_none(), "SUNFLECK_REQUIRE_GPU is set, but: {error}");
-            None
-        }
-    });
-    if opened.is_none() {
-        println!("skipped: no GPU adapter");
-    }
-    opened.clone()
-}
+pub use crate::gpu_search::context;
 
 /// A device with ray queries; `None` without an adapter that has them.
 pub fn context_with_ray_queries() -> Option<Arc<Context>> {

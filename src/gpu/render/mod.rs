@@ -14,7 +14,7 @@ use super::Method;
 use super::buffers::{Array, Readback};
 use super::context::Context;
 use super::hardware::Hardware;
-use super::index::Index;
+use super::index::{Index, Sorted};
 use super::kernels::{ACCELERATION_STRUCTURE, Access, Batch, Kernel, Modules, Shared};
 use super::timer::Timer;
 use crate::layout::{Camera, EyeVertex, Frame, Photon, PointBox};
@@ -95,7 +95,7 @@ impl GpuStages {
         let modules = Modules::new(&context, &shared);
         let trace_eye = modules.kernel("eye", "trace_eye", &[Write])?;
         let paths = PhotonPaths::new(&modules)?;
-        let index = Index::new(&modules)?;
+        let index = Index::new(&modules, &Sorted { permute: ("permute", "permute"), words: PHOTON_WORDS })?;
         let (gather, hardware) = match method {
             Method::Tree => (modules.kernel("gather", "gather", &[Read, Read, Read, Read, Write])?, None),
             Method::Hardware => {
@@ -151,7 +151,7 @@ impl GpuStages {
         (0..height).step_by(rows as usize).map(move |first| (first, rows.min(height - first)))
     }
 
-    /// The boxes of the tree, all levels, leaves first.
+    /// The boxes of the tree, all levels, leaves first; none where ray queries search.
     pub fn tree(&mut self) -> Result<Vec<PointBox>, Error> {
         let n = self.index.levels.last().map_or(0, |[first, n]| first + n);
         self.read(Source::Boxes, n)
@@ -243,17 +243,26 @@ impl Stages for GpuStages {
         let n = self.n_photons;
         self.photons.reserve(&self.context, u64::from(n))?;
         self.other_photons.reserve(&self.context, self.photons.capacity())?;
-        self.index.reserve(&self.context, n)?;
-        if let Some(hardware) = &mut self.hardware {
-            hardware.reserve(&self.context, n)?;
+        match &mut self.hardware {
+            None => self.index.reserve(&self.context, n)?,
+            Some(hardware) => {
+                self.index.reserve_sort(&self.context, n)?;
+                hardware.reserve(&self.context, n)?;
+            }
         }
         self.scene.set_frame(&self.context, frame);
         let mut batch = Batch::new(&self.context, &self.shared, "build");
         self.timer.begin(BUILD, &mut batch);
-        self.index.build(&mut batch, n, &self.photons, &self.other_photons);
-        if let Some(hardware) = &mut self.hardware {
-            let radius = self.largest_radius.0 * frame.radius_scale;
-            hardware.build(&mut batch, n, &self.other_photons, PHOTON_WORDS, radius);
+        let photons = self.photons.all();
+        match &mut self.hardware {
+            None => self.index.build(&mut batch, n, &photons, PHOTON_WORDS, &self.other_photons),
+            Some(hardware) => {
+                if n > 0 {
+                    self.index.sort(&mut batch, n, &photons, PHOTON_WORDS, &self.other_photons);
+                }
+                let radius = self.largest_radius.0 * frame.radius_scale;
+                hardware.build(&mut batch, n, &self.other_photons, PHOTON_WORDS, radius);
+            }
         }
         self.timer.end(BUILD, batch, &self.context)?;
         std::mem::swap(&mut self.photons, &mut self.other_photons);
@@ -262,10 +271,12 @@ impl Stages for GpuStages {
 
     fn gather(&mut self, frame: &Frame) -> Result<(), Error> {
         self.check_pixels(frame)?;
-        self.index.reserve(&self.context, 0)?;
         self.photons.reserve(&self.context, 0)?;
         let tree = match &self.hardware {
-            None => self.index.nodes.all(),
+            None => {
+                self.index.reserve(&self.context, 0)?;
+                self.index.nodes.all()
+            }
             Some(hardware) => {
                 let (largest, query) = self.largest_radius;
                 hardware.tree(&self.context, query, largest * frame.radius_scale)?
