@@ -47,7 +47,7 @@ pub fn open_backend(name: &str) -> Result<Device> {
     if name == "cpu" {
         return Ok(Device::Cpu);
     }
-    Ok(Device::Gpu(Arc::new(Context::new(&Choice::Any)?)))
+    Ok(Device::Gpu(Arc::new(Context::new(&Choice::Any)?), Method::Tree))
 }
 
 /// `cpu`: there is no other.
