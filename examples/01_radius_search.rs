@@ -4,7 +4,8 @@ use glam::Vec3;
 use sunfleck::index::{PointBvh, Radii, RadiusSearch};
 
 fn main() -> Result<(), sunfleck::index::Error> {
-    let points: Vec<Vec3> = (0..1000).map(|i| Vec3::new((i % 10) as f32, (i / 10 % 10) as f32, (i / 100) as f32)).collect();
+    let points: Vec<Vec3> =
+        (0..1000).map(|i| Vec3::new((i % 10) as f32, (i / 10 % 10) as f32, (i / 100) as f32)).collect();
     let queries = [Vec3::new(4.5, 4.5, 4.5), Vec3::ZERO, Vec3::splat(-3.0)];
     let index = PointBvh::new(&points)?;
 

@@ -1,6 +1,7 @@
 //! Sunfleck: progressive photon mapping, and the neighbour search under it.
 //!
-//! Import order, left never names right: `math` → `index` → `device` → `layout` → `scene` → `ppm` → `cpu` | `gpu` → `output`.
+//! Import order, left never names right: `math` → `index` → `points` → `device` → `layout` → `scene` → `ppm` → `cpu` |
+//! `gpu` → `output`.
 //! `cpu` and `gpu` do not know each other.
 
 #[cfg(feature = "render")]
@@ -13,6 +14,8 @@ pub mod layout;
 pub mod math;
 #[cfg(feature = "render")]
 pub mod output;
+#[cfg(feature = "points")]
+pub mod points;
 #[cfg(feature = "render")]
 pub mod ppm;
 #[cfg(feature = "render")]

@@ -3,9 +3,13 @@
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod backends;
 #[cfg(feature = "render")]
+mod bench;
+#[cfg(feature = "render")]
 mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
+#[cfg(feature = "gpu")]
+mod gpu_search;
 mod index;
 mod indices;
 mod layering;

@@ -1,5 +1,7 @@
 //! The command line: what may be typed, and what it means.
 
+pub mod points;
+
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -26,7 +28,8 @@ const EXAMPLES: &str = "\
 Examples:
   sunfleck render glass -o glass.png
   sunfleck render my.glb -o my.exr -o my.png --seconds 300 -r 1920x1080
-  sunfleck compare my.exr reference.exr";
+  sunfleck compare my.exr reference.exr
+  sunfleck points normals scan.ply -o normals.ply";
 
 const RENDER_EXAMPLES: &str = "\
 Examples:
@@ -66,6 +69,10 @@ pub enum Command {
     #[command(after_help = "relMSE is the mean over pixels and channels of (x - y)² / (y² + 0.01); \
         the trimmed one leaves out the worst 0.1 % of the pixels.")]
     Compare(CompareArgs),
+    /// Make the evaluation of the neighbour search again: figures and tables
+    Bench(crate::bench::BenchArgs),
+    /// Geometry tasks on point clouds: normals, correspondence, registration
+    Points(points::PointsArgs),
 }
 
 #[derive(Debug, Args)]
@@ -167,6 +174,10 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N|NAME", help_heading = "Device")]
     pub device: Option<String>,
 
+    /// How the GPU finds photons; hardware: by ray queries, where the adapter has them (see --list-devices)
+    #[arg(long, value_parser = ["tree", "hardware"], default_value = "tree", help_heading = "Device")]
+    pub index: String,
+
     /// CPU threads [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Device")]
     pub threads: Option<u16>,
@@ -259,7 +270,7 @@ fn crop(text: &str) -> Result<Crop, String> {
     Ok(Crop([x0, x1, y0, y1]))
 }
 
-fn size(text: &str) -> Result<[u32; 2], String> {
+pub fn size(text: &str) -> Result<[u32; 2], String> {
     let (width, height) = text.split_once(['x', 'X', '×']).ok_or("a size looks like 1280x720")?;
     let side = |t: &str| match t.trim().parse() {
         Ok(n) if (1..=MAX_SIDE).contains(&n) => Ok(n),

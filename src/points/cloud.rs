@@ -1,0 +1,162 @@
+//! A cloud of points, and the index over it.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::Error;
+use crate::index::{NearestLists, PointBvh, Radii, RadiusSearch};
+
+/// Size of a coordinate, at most: its square and sums of squares stay finite.
+pub const MAX_COORDINATE: f64 = 1e100;
+/// Points asked for the spacing of a cloud.
+const SPACING_SAMPLES: usize = 16_384;
+/// Of which coincident points may hide the nearest distinct one.
+const SPACING_K: usize = 8;
+/// Points whose sums are taken by one thread: fixed, so that sums do not depend on the number of threads.
+pub(super) const CHUNK: usize = 4096;
+
+/// What positions are written as.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Precision {
+    /// 32-bit floats.
+    #[default]
+    Single,
+    /// 64-bit floats.
+    Double,
+}
+
+/// Points, and what is known of each.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Cloud {
+    /// In the cloud's unit; finite.
+    pub positions: Vec<DVec3>,
+    /// Of unit length, or zero where there is none.
+    pub normals: Option<Vec<Vec3>>,
+    /// Red, green, blue, alpha, as found.
+    pub colours: Option<Vec<[u8; 4]>>,
+    /// Of the file that it came from.
+    pub precision: Precision,
+}
+
+impl Cloud {
+    /// Bare points.
+    pub fn new(positions: Vec<DVec3>) -> Self {
+        Self { positions, ..Self::default() }
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.positions.is_empty()
+    }
+}
+
+/// Least and largest corner; None without points.
+pub(super) fn bounds(positions: &[DVec3]) -> Option<(DVec3, DVec3)> {
+    positions.par_iter().with_min_len(CHUNK).map(|&p| (p, p)).reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+}
+
+/// Coordinates for the search: the cloud's centre at the origin, its longest side between 1/2 and 1.
+///
+/// The scale is a power of two, so only the origin costs rounding: 2⁻²⁵ of the longest side. With it a cloud gives the
+/// same answers in millimetres and in kilometres, and squared distances neither overflow nor vanish.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    origin: DVec3,
+    scale: f64,
+}
+
+impl Frame {
+    /// That of a cloud.
+    pub fn of(positions: &[DVec3]) -> Self {
+        let Some((min, max)) = bounds(positions) else { return Self { origin: DVec3::ZERO, scale: 1.0 } };
+        let side = (max - min).max_element();
+        let scale = if side > 0.0 { (-side.log2().ceil()).clamp(-1000.0, 1000.0).exp2() } else { 1.0 };
+        Self { origin: 0.5 * (min + max), scale }
+    }
+
+    /// A position in the frame.
+    #[inline]
+    pub fn local(&self, position: DVec3) -> Vec3 {
+        ((position - self.origin) * self.scale).as_vec3()
+    }
+
+    /// A distance in the frame.
+    #[inline]
+    pub fn length(&self, distance: f64) -> f64 {
+        distance * self.scale
+    }
+
+    fn locals(&self, positions: &[DVec3]) -> Vec<Vec3> {
+        positions.par_iter().with_min_len(CHUNK).map(|&p| self.local(p)).collect()
+    }
+}
+
+/// A cloud's points with the index over them.
+#[derive(Clone, Debug)]
+pub struct Indexed<'a> {
+    positions: &'a [DVec3],
+    frame: Frame,
+    tree: PointBvh,
+}
+
+impl<'a> Indexed<'a> {
+    /// Builds the index; refuses what is not finite.
+    pub fn new(positions: &'a [DVec3]) -> Result<Self, Error> {
+        check(positions)?;
+        let frame = Frame::of(positions);
+        let tree = PointBvh::new(&frame.locals(positions))?;
+        Ok(Self { positions, frame, tree })
+    }
+
+    /// The points.
+    pub fn positions(&self) -> &'a [DVec3] {
+        self.positions
+    }
+
+    /// Where the index lives.
+    pub fn frame(&self) -> Frame {
+        self.frame
+    }
+
+    /// Over the points in the frame.
+    pub fn tree(&self) -> &PointBvh {
+        &self.tree
+    }
+
+    /// The `k` nearest points of each query within `radius` (cloud's unit, may be infinite; slightly more is found, for
+    /// the rounding in the frame). Distances are the frame's.
+    pub fn nearest(&self, queries: &[DVec3], radius: f64, k: usize) -> Result<NearestLists, Error> {
+        let rounding = 1e-6 * (1.0 + self.frame.length(radius));
+        let radius = (self.frame.length(radius) + rounding) as f32;
+        Ok(self.tree.nearest_all(&self.frame.locals(queries), Radii::One(radius), k)?)
+    }
+
+    /// Median distance of a point to the nearest one that is elsewhere, cloud's unit; None if there is no such.
+    pub fn spacing(&self) -> Option<f64> {
+        let step = self.positions.len().div_ceil(SPACING_SAMPLES).max(1);
+        let asked: Vec<DVec3> = self.positions.iter().copied().step_by(step).collect();
+        let lists = self.nearest(&asked, f64::INFINITY, SPACING_K).ok()?;
+        let elsewhere = |(row, &p): (&[u32], &DVec3)| {
+            let near = row.iter().filter_map(|&i| self.positions.get(i as usize));
+            near.map(|q| q.distance(p)).filter(|&d| d > 0.0).min_by(f64::total_cmp)
+        };
+        median(lists.indices.chunks(SPACING_K).zip(&asked).filter_map(elsewhere).collect())
+    }
+}
+
+/// The upper median; None of nothing.
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// Refuses coordinates that cannot be computed with.
+pub(super) fn check(positions: &[DVec3]) -> Result<(), Error> {
+    let wrong = |p: &DVec3| !p.is_finite() || p.abs().max_element() > MAX_COORDINATE;
+    positions.iter().position(wrong).map_or(Ok(()), |at| Err(Error::Coordinate(at)))
+}
