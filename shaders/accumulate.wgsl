@@ -1,5 +1,5 @@
 // Adds an iteration's image to the film, as ppm::film::add does.
-#import common
+#import frame
 
 @group(0) @binding(0) var<storage, read> radiance: array<vec4<f32>>;
 @group(0) @binding(1) var<storage, read_write> film: array<vec4<f32>>;

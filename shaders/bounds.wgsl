@@ -1,7 +1,8 @@
-// Box around all photons: first of each block of BLOCK photons, then of the blocks.
+// Box around all points: first of each block of BLOCK points, then of the blocks.
 #import common
 
-@group(0) @binding(0) var<storage, read> photons: array<Photon>;
+// Records of some words, a position first in each.
+@group(0) @binding(0) var<storage, read> positions: array<f32>;
 @group(0) @binding(1) var<storage, read_write> blocks: array<PointBox>;
 @group(0) @binding(2) var<storage, read_write> bounds: PointBox;
 
@@ -23,7 +24,7 @@ fn reduce(local: u32) {
     }
 }
 
-// Reads photons, writes blocks; one workgroup per block. values.x: photons.
+// Reads positions, writes blocks; one workgroup per block. values: points, words in a record.
 @compute @workgroup_size(64)
 fn bounds_of_blocks(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -37,7 +38,8 @@ fn bounds_of_blocks(
     for (var j = 0u; j < PER_THREAD; j++) {
         let i = block * BLOCK + j * THREADS + local;
         if i < n {
-            let position = photons[i].position;
+            let at = i * arguments.values.y;
+            let position = vec3(positions[at], positions[at + 1u], positions[at + 2u]);
             box_min = min(box_min, position);
             box_max = max(box_max, position);
         }
@@ -50,7 +52,7 @@ fn bounds_of_blocks(
     }
 }
 
-// Reads blocks, writes bounds; one workgroup. values.x: photons.
+// Reads blocks, writes bounds; one workgroup. values.x: points.
 @compute @workgroup_size(64)
 fn bounds_of_all(@builtin(local_invocation_index) local: u32) {
     let n = (arguments.values.x + BLOCK - 1u) / BLOCK;

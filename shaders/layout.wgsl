@@ -186,3 +186,11 @@ struct PointBox {
     max: vec3<f32>,
     pad1: u32,
 }
+
+struct TreeNode {
+    origin: vec3<f32>,
+    exponents: u32,
+    x: vec4<u32>,
+    y: vec4<u32>,
+    z: vec4<u32>,
+}

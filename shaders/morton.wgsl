@@ -1,7 +1,8 @@
-// 63-bit Morton code of each photon in the photons' bounds, 21 bits an axis.
+// 63-bit Morton code of each point in the points' bounds, 21 bits an axis.
 #import common
 
-@group(0) @binding(0) var<storage, read> photons: array<Photon>;
+// Records of some words, a position first in each.
+@group(0) @binding(0) var<storage, read> positions: array<f32>;
 @group(0) @binding(1) var<storage, read> bounds: PointBox;
 // Low and high word.
 @group(0) @binding(2) var<storage, read_write> keys: array<vec2<u32>>;
@@ -30,7 +31,7 @@ fn morton(cell: vec3<u32>) -> vec2<u32> {
     return vec2(low | (upper << 30u), (upper >> 2u) | ((x >> 30u) << 30u));
 }
 
-// Reads photons and bounds, writes keys and order; one thread per photon. values.x: photons.
+// Reads positions and bounds, writes keys and order; one thread per point. values: points, words in a record.
 @compute @workgroup_size(64)
 fn morton_keys(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -45,7 +46,9 @@ fn morton_keys(
     // Below this the quotient would overflow; everything is then in one cell.
     let flat = extent < vec3(1e-30);
     let scale = select(vec3(CELLS) / extent, vec3(0.0), flat);
-    let scaled = (photons[i].position - bounds.min) * scale;
+    let at = i * arguments.values.y;
+    let position = vec3(positions[at], positions[at + 1u], positions[at + 2u]);
+    let scaled = (position - bounds.min) * scale;
     let cell = vec3<u32>(clamp(scaled, vec3(0.0), vec3(CELLS - 1.0)));
     keys[i] = morton(cell);
     order[i] = i;

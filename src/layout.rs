@@ -363,3 +363,20 @@ pub struct PointBox {
     /// Zero.
     pub pad1: u32,
 }
+
+/// Eight boxes of the tree over points, in 64 bytes: a box reaches from `origin + low · 2^e` to `origin + high · 2^e`
+/// along each axis and holds what it stands for (the compressed wide nodes of Ylitie et al. 2017).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct TreeNode {
+    /// Least corner of all children.
+    pub origin: [f32; 3],
+    /// e + 127 of x, y and z from the lowest byte up; the highest is the number of children.
+    pub exponents: u32,
+    /// Along x, a byte a child: low of children 0–3, of 4–7, high of 0–3, of 4–7.
+    pub x: [u32; 4],
+    /// Along y.
+    pub y: [u32; 4],
+    /// Along z.
+    pub z: [u32; 4],
+}

@@ -1,11 +1,13 @@
 //! Sunfleck: progressive photon mapping, and the neighbour search under it.
 //!
-//! Import order, left never names right: `math` → `index` → `points` → `layout` → `scene` → `ppm` → `cpu` | `gpu` → `output`.
+//! Import order, left never names right: `math` → `index` → `points` → `device` → `layout` → `scene` → `ppm` → `cpu` |
+//! `gpu` → `output`.
 //! `cpu` and `gpu` do not know each other.
 
 #[cfg(feature = "render")]
 pub mod cpu;
-#[cfg(all(feature = "render", feature = "gpu"))]
+pub mod device;
+#[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod index;
 pub mod layout;

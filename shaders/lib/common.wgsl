@@ -1,15 +1,16 @@
-// What every kernel sees: the constants of the iteration and the arguments of one dispatch.
+// What every kernel sees: the arguments of one dispatch.
 #import layout
 
 struct Arguments {
     // What each kernel says it is.
     values: vec4<u32>,
-    // Tree over photons: (first box, number of boxes) of two levels in each.
+    // Tree over points: (first box, number of boxes) of two levels in each.
     levels: array<vec4<u32>, 6>,
+    // What each kernel says it is.
+    further: vec4<u32>,
 }
 
 @group(1) @binding(0) var<uniform> arguments: Arguments;
-@group(1) @binding(1) var<uniform> frame: Frame;
 
 // Index of a thread in a dispatch that may be spread over two dimensions; `threads` a workgroup.
 fn thread_index(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32, threads: u32) -> u32 {
@@ -25,4 +26,10 @@ fn tile_pixel(workgroup: vec3<u32>, workgroups: vec3<u32>, local: u32, width: u3
     let x = (local & 3u) | ((local >> 1u) & 4u);
     let y = ((local >> 2u) & 1u) | ((local >> 3u) & 6u);
     return corner + vec2(x, y);
+}
+
+// (first box, number of boxes) of a level of the tree.
+fn level_of(level: u32) -> vec2<u32> {
+    let pair = arguments.levels[level / 2u];
+    return select(pair.zw, pair.xy, (level & 1u) == 0u);
 }

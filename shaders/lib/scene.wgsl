@@ -1,5 +1,5 @@
 // The packed scene.
-#import common
+#import frame
 #import basis
 
 struct Tables {
@@ -15,18 +15,18 @@ struct Tables {
     has_extended: u32,
 }
 
-@group(1) @binding(2) var<uniform> camera: Camera;
-@group(1) @binding(3) var<uniform> scene_info: SceneInfo;
-@group(1) @binding(4) var<uniform> tables: Tables;
+@group(2) @binding(1) var<uniform> camera: Camera;
+@group(2) @binding(2) var<uniform> scene_info: SceneInfo;
+@group(2) @binding(3) var<uniform> tables: Tables;
 
-@group(2) @binding(0) var<storage, read> nodes: array<SceneNode>;
-@group(2) @binding(1) var<storage, read> primitives: array<Primitive>;
-@group(2) @binding(2) var<storage, read> vertices: array<Vertex>;
-@group(2) @binding(3) var<storage, read> texels: array<u32>;
+@group(3) @binding(0) var<storage, read> nodes: array<SceneNode>;
+@group(3) @binding(1) var<storage, read> primitives: array<Primitive>;
+@group(3) @binding(2) var<storage, read> vertices: array<Vertex>;
+@group(3) @binding(3) var<storage, read> texels: array<u32>;
 // Radiance and the cumulative probability within the row.
-@group(2) @binding(4) var<storage, read> environment_texels: array<vec4<f32>>;
+@group(3) @binding(4) var<storage, read> environment_texels: array<vec4<f32>>;
 // Materials, texture slots, lights, environment rows and albedo in one, for bindings are few.
-@group(2) @binding(5) var<storage, read> table: array<vec4<u32>>;
+@group(3) @binding(5) var<storage, read> table: array<vec4<u32>>;
 
 fn material_at(index: u32) -> Material {
     let at = tables.materials + index * 7u;

@@ -6,15 +6,13 @@ use std::sync::{Arc, Mutex};
 
 use bytemuck::{Pod, Zeroable};
 
-use super::context::Context;
-use super::scene::{SceneBuffers, Tables};
+use super::context::{Context, Scopes};
 use super::shaders;
-use crate::layout::{Camera, Frame, SceneInfo};
-use crate::ppm::Error;
+use crate::device::Error;
 
 /// How a kernel uses a storage buffer.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Access {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
     /// Reads it.
     Read,
     /// Reads or writes it.
@@ -26,8 +24,8 @@ pub(super) struct Kernel {
     name: &'static str,
     pipeline: wgpu::ComputePipeline,
     bindings: wgpu::BindGroupLayout,
-    /// Whether it reads the scene.
-    scene: bool,
+    /// How many of [`Shared`]'s further groups it sees.
+    n_groups: usize,
 }
 
 /// Twin of `Arguments` in `shaders/lib/common.wgsl`.
@@ -36,6 +34,7 @@ pub(super) struct Kernel {
 pub(super) struct Arguments {
     pub(super) values: [u32; 4],
     pub(super) levels: [[u32; 2]; 12],
+    pub(super) further: [u32; 4],
 }
 
 impl From<[u32; 4]> for Arguments {
@@ -49,71 +48,93 @@ const STRIDE: u64 = 256;
 /// Dispatches in one submission.
 const CAPACITY: u64 = 256;
 
-/// What all kernels share: the second bind group, and the third for those that read the scene.
-pub(super) struct Shared {
+/// A bind group of several kernels.
+pub(super) struct Group {
     layout: wgpu::BindGroupLayout,
     group: wgpu::BindGroup,
+}
+
+impl Group {
+    /// One binding after the other: how it is used, and what it is.
+    pub(super) fn new(
+        context: &Context,
+        label: &str,
+        bindings: &[(wgpu::BindingType, wgpu::BindingResource<'_>)],
+    ) -> Self {
+        let numbered = || (0..).zip(bindings);
+        let entries: Vec<_> = numbered()
+            .map(|(binding, &(ty, _))| wgpu::BindGroupLayoutEntry {
+                binding,
+                visibility: wgpu::ShaderStages::COMPUTE,
+                ty,
+                count: None,
+            })
+            .collect();
+        let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries };
+        let layout = context.device.create_bind_group_layout(&descriptor);
+        let entries: Vec<_> = numbered()
+            .map(|(binding, (_, resource))| wgpu::BindGroupEntry { binding, resource: resource.clone() })
+            .collect();
+        let descriptor = wgpu::BindGroupDescriptor { label: Some(label), layout: &layout, entries: &entries };
+        let group = context.device.create_bind_group(&descriptor);
+        Self { layout, group }
+    }
+}
+
+/// A uniform of `bytes`; `dynamic` when each dispatch sees another part of the buffer.
+pub(super) fn uniform(bytes: u64, dynamic: bool) -> wgpu::BindingType {
+    wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Uniform,
+        has_dynamic_offset: dynamic,
+        min_binding_size: NonZeroU64::new(bytes),
+    }
+}
+
+/// A storage buffer.
+pub(super) fn storage(access: Access) -> wgpu::BindingType {
+    wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Storage { read_only: access == Access::Read },
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    }
+}
+
+impl From<Access> for wgpu::BindingType {
+    fn from(access: Access) -> Self {
+        storage(access)
+    }
+}
+
+/// What ray queries search.
+pub(super) const ACCELERATION_STRUCTURE: wgpu::BindingType =
+    wgpu::BindingType::AccelerationStructure { vertex_return: false };
+
+/// What all kernels share. Bind group 0 is a kernel's own, 1 holds the arguments of the dispatch, those after it are the
+/// user's: a kernel sees them if its text names `@group(2)`, or `@group(3)`.
+pub(super) struct Shared {
     arguments: wgpu::Buffer,
-    frame: wgpu::Buffer,
-    scene: SceneBuffers,
+    /// From 1 on.
+    groups: Vec<Group>,
 }
 
 impl Shared {
-    pub(super) fn new(context: &Context, scene: SceneBuffers) -> Self {
-        let device = &context.device;
-        let entry = |binding, dynamic, bytes: usize| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer {
-                ty: wgpu::BufferBindingType::Uniform,
-                has_dynamic_offset: dynamic,
-                min_binding_size: NonZeroU64::new(bytes as u64),
-            },
-            count: None,
-        };
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("shared"),
-            entries: &[
-                entry(0, true, size_of::<Arguments>()),
-                entry(1, false, size_of::<Frame>()),
-                entry(2, false, size_of::<Camera>()),
-                entry(3, false, size_of::<SceneInfo>()),
-                entry(4, false, size_of::<Tables>()),
-            ],
+    pub(super) fn new(context: &Context, further: Vec<Group>) -> Self {
+        let arguments = context.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("arguments"),
+            size: STRIDE * CAPACITY,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
         });
-        let uniform = |label, size| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size,
-                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
-        };
-        let arguments = uniform("arguments", STRIDE * CAPACITY);
-        let frame = uniform("frame", size_of::<Frame>() as u64);
         let window = wgpu::BufferBinding { buffer: &arguments, offset: 0, size: NonZeroU64::new(STRIDE) };
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("shared"),
-            layout: &layout,
-            entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::Buffer(window) },
-                wgpu::BindGroupEntry { binding: 1, resource: frame.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 2, resource: scene.camera.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 3, resource: scene.info.as_entire_binding() },
-                wgpu::BindGroupEntry { binding: 4, resource: scene.tables.as_entire_binding() },
-            ],
-        });
-        Self { layout, group, arguments, frame, scene }
-    }
-
-    /// Constants of the dispatches submitted from now on.
-    pub(super) fn set_frame(&self, context: &Context, frame: &Frame) {
-        context.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(frame));
+        let binding = (uniform(size_of::<Arguments>() as u64, true), wgpu::BindingResource::Buffer(window));
+        let mut groups = vec![Group::new(context, "arguments", &[binding])];
+        groups.extend(further);
+        Self { arguments, groups }
     }
 }
 
-/// The kernels of one device; each is made once.
-pub(super) type Cache = Mutex<HashMap<&'static str, Arc<Kernel>>>;
+/// The kernels of one device by module and entry point; each is made once.
+pub(super) type Cache = Mutex<HashMap<(&'static str, &'static str), Arc<Kernel>>>;
 
 /// Makes kernels.
 pub(super) struct Modules<'a> {
@@ -126,47 +147,61 @@ impl<'a> Modules<'a> {
         Self { context, shared }
     }
 
-    /// The entry point `name` of `module`, whose storage buffers are used as `accesses` says, in the order of their
-    /// bindings; the scene's come besides if the module imports it.
-    pub(super) fn kernel(&self, module: &str, name: &'static str, accesses: &[Access]) -> Result<Arc<Kernel>, Error> {
+    /// The entry point `name` of `module`; `bindings` are those of its group 0, storage buffers by their [`Access`].
+    pub(super) fn kernel(
+        &self,
+        module: &'static str,
+        name: &'static str,
+        bindings: &[impl Copy + Into<wgpu::BindingType>],
+    ) -> Result<Arc<Kernel>, Error> {
         let mut known = self.context.kernels.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        if let Some(kernel) = known.get(name) {
+        if let Some(kernel) = known.get(&(module, name)) {
             return Ok(Arc::clone(kernel));
         }
-        let kernel = Arc::new(self.build(module, name, accesses)?);
-        known.insert(name, Arc::clone(&kernel));
+        let built = self.build(module, shaders::source(module), name, bindings, false);
+        let kernel = Arc::new(built.map_err(|error| self.context.error(format!("{module}.wgsl: {error}")))?);
+        known.insert((module, name), Arc::clone(&kernel));
         Ok(kernel)
     }
 
-    fn build(&self, module: &str, name: &'static str, accesses: &[Access]) -> Result<Kernel, Error> {
+    /// The entry point `name` of a text from outside this crate; what is wrong with it is an error that names the line.
+    pub(super) fn custom(
+        &self,
+        source: String,
+        name: &'static str,
+        bindings: &[impl Copy + Into<wgpu::BindingType>],
+    ) -> Result<Kernel, Error> {
+        self.build("custom", source, name, bindings, true).map_err(|error| Error::Shader(error.to_string()))
+    }
+
+    fn build(
+        &self,
+        module: &str,
+        source: String,
+        name: &'static str,
+        bindings: &[impl Copy + Into<wgpu::BindingType>],
+        zero_workgroup_memory: bool,
+    ) -> Result<Kernel, wgpu::Error> {
         let device = &self.context.device;
-        let source = shaders::source(module);
-        let scene = source.contains("@group(2)");
+        let n_groups = (1..4).rev().find(|n| source.contains(&format!("@group({n})"))).unwrap_or(0);
         let build = || {
             let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(module),
                 source: wgpu::ShaderSource::Wgsl(source.into()),
             });
-            let entries: Vec<_> = accesses
-                .iter()
-                .enumerate()
-                .map(|(binding, access)| wgpu::BindGroupLayoutEntry {
-                    binding: binding as u32,
+            let entries: Vec<_> = (0..)
+                .zip(bindings)
+                .map(|(binding, &ty)| wgpu::BindGroupLayoutEntry {
+                    binding,
                     visibility: wgpu::ShaderStages::COMPUTE,
-                    ty: wgpu::BindingType::Buffer {
-                        ty: wgpu::BufferBindingType::Storage { read_only: *access == Access::Read },
-                        has_dynamic_offset: false,
-                        min_binding_size: None,
-                    },
+                    ty: ty.into(),
                     count: None,
                 })
                 .collect();
             let bindings = device
                 .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(name), entries: &entries });
-            let mut groups = vec![Some(&bindings), Some(&self.shared.layout)];
-            if scene {
-                groups.push(Some(&self.shared.scene.layout));
-            }
+            let shared = self.shared.groups[..n_groups].iter().map(|group| Some(&group.layout));
+            let groups: Vec<_> = std::iter::once(Some(&bindings)).chain(shared).collect();
             let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some(name),
                 bind_group_layouts: &groups,
@@ -178,30 +213,33 @@ impl<'a> Modules<'a> {
                 module: &shader,
                 entry_point: Some(name),
                 compilation_options: wgpu::PipelineCompilationOptions {
-                    // Nothing here reads workgroup memory that it has not written.
-                    zero_initialize_workgroup_memory: false,
+                    // Nothing of this crate reads workgroup memory that it has not written.
+                    zero_initialize_workgroup_memory: zero_workgroup_memory,
                     ..Default::default()
                 },
                 cache: None,
             });
-            Kernel { name, pipeline, bindings, scene }
+            Kernel { name, pipeline, bindings, n_groups }
         };
-        self.context.scoped(build).map_err(|error| self.context.error(format!("{module}.wgsl: {error}")))
+        self.context.scoped(build)
     }
 }
 
-/// Dispatches that are submitted together.
+/// Dispatches that are submitted together. What goes wrong while they are recorded is returned by [`Batch::submit`], and
+/// never reaches the handler of a device's owner; batches of one thread must end in reverse order of their beginning.
 pub(super) struct Batch<'a> {
     context: &'a Context,
     shared: &'a Shared,
+    scopes: Scopes,
     encoder: wgpu::CommandEncoder,
     arguments: Vec<u8>,
 }
 
 impl<'a> Batch<'a> {
     pub(super) fn new(context: &'a Context, shared: &'a Shared, label: &str) -> Self {
+        let scopes = Scopes::new(&context.device);
         let encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) });
-        Self { context, shared, encoder, arguments: Vec::new() }
+        Self { context, shared, scopes, encoder, arguments: Vec::new() }
     }
 
     /// For copies and timestamps.
@@ -240,9 +278,9 @@ impl<'a> Batch<'a> {
             .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(kernel.name), timestamp_writes: None });
         pass.set_pipeline(&kernel.pipeline);
         pass.set_bind_group(0, &group, &[]);
-        pass.set_bind_group(1, &self.shared.group, &[offset as u32]);
-        if kernel.scene {
-            pass.set_bind_group(2, &self.shared.scene.group, &[]);
+        for (i, shared) in self.shared.groups[..kernel.n_groups].iter().enumerate() {
+            let offsets: &[u32] = if i == 0 { &[offset as u32] } else { &[] };
+            pass.set_bind_group(i as u32 + 1, &shared.group, offsets);
         }
         // One dimension holds 65535; the kernels put the two together again.
         let most = self.context.limits.max_compute_workgroups_per_dimension.min(65535);
@@ -256,6 +294,9 @@ impl<'a> Batch<'a> {
             self.context.queue.write_buffer(&self.shared.arguments, 0, &self.arguments);
         }
         self.context.queue.submit([self.encoder.finish()]);
+        if let Some(error) = self.scopes.first() {
+            return Err(self.context.error(error.to_string()));
+        }
         self.context.check()
     }
 }

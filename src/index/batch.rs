@@ -6,9 +6,10 @@ use rayon::prelude::*;
 use super::{Error, MAX_K, Nearest, Neighbour, RadiusSearch};
 
 /// Queries a thread takes at once.
-const GRAIN: usize = 256;
+pub(super) const GRAIN: usize = 256;
 
-/// The radius of each query, from 0 to the index's [`RadiusSearch::max_radius`]; infinite finds all.
+/// The radius of each query, from 0 to the index's [`RadiusSearch::max_radius`]; infinite finds all
+/// whose squared distance is a finite number.
 #[derive(Clone, Copy, Debug)]
 pub enum Radii<'a> {
     /// The same for all.
@@ -24,6 +25,14 @@ impl Radii<'_> {
         match self {
             Self::One(radius) => *radius,
             Self::Each(radii) => radii[query],
+        }
+    }
+
+    /// Those of some of the queries.
+    pub fn part(&self, queries: std::ops::Range<usize>) -> Self {
+        match self {
+            Self::One(radius) => Self::One(*radius),
+            Self::Each(radii) => Self::Each(&radii[queries]),
         }
     }
 

@@ -1,11 +1,23 @@
 //! Neighbour search over points: radius search and truncated k-NN. Usable alone: nothing here knows of photons.
 //!
 //! Everything is in the caller's unit. A point is within a radius when |p − q|² ≤ r², the squares taken in `f32` as
-//! x² + y² + z² from left to right, so that every index finds the same set, bit for bit.
+//! x² + y² + z² from left to right, so that every index finds the same set, bit for bit. A distance whose square
+//! overflows is beyond every radius, the infinite one included.
 
 mod batch;
+mod blocks;
 mod bvh;
+mod grid;
+mod kd;
+mod kd_buffered;
+mod lanes;
 mod nearest;
+mod packet;
+mod queries_as_boxes;
+mod sample_boxes;
+mod sample_build;
+pub mod stats;
+mod walk;
 
 use std::ops::ControlFlow;
 
@@ -13,7 +25,12 @@ use glam::Vec3;
 
 pub use batch::{NearestLists, Neighbours, Radii};
 pub use bvh::PointBvh;
+pub use grid::{HashGrid, QueryOrder};
+pub use kd::KdTree;
+pub use kd_buffered::{Buffers, KdBuffered};
 pub use nearest::{MAX_K, Nearest, Neighbour};
+pub use queries_as_boxes::queries_as_boxes;
+pub use sample_boxes::{Boxes, Builder, SampleBvh, SampleOptions};
 
 /// Points in one leaf of [`PointBvh`].
 pub const LEAF_SIZE: u32 = 8;
@@ -42,6 +59,9 @@ pub enum Error {
         /// As given.
         radius: f32,
     },
+    /// An index is built for a radius of zero or more, infinite included.
+    #[error("an index cannot be built for the radius {0}")]
+    BuiltRadius(f32),
     /// Above [`RadiusSearch::max_radius`]: neighbours would be missed.
     #[error("radius {radius} of query {query} is above {built}, for which the index was built")]
     RadiusAboveBuilt {
@@ -55,6 +75,16 @@ pub enum Error {
     /// Not in 1 … [`MAX_K`].
     #[error("k is {0}: 1 to {MAX_K} are possible")]
     K(usize),
+    /// More neighbours than a row of the result buffers holds: none is dropped silently.
+    #[error("{queries} queries have more than {capacity} neighbours, one of them {most}")]
+    Truncated {
+        /// How many queries.
+        queries: usize,
+        /// Length of a row.
+        capacity: usize,
+        /// The most neighbours of one query.
+        most: u32,
+    },
     /// As many radii as queries are needed.
     #[error("{radii} radii for {queries} queries")]
     Lengths {
@@ -158,6 +188,12 @@ pub fn distance2(a: Vec3, b: Vec3) -> f32 {
     d.x * d.x + d.y * d.y + d.z * d.z
 }
 
+/// The square of a radius, as every index compares with it: finite, so that what is infinitely far is never within.
+#[inline]
+pub fn radius2(radius: f32) -> f32 {
+    (radius * radius).min(f32::MAX)
+}
+
 /// Refuses points that no index takes.
 pub fn check_points(points: &[Vec3]) -> Result<(), Error> {
     if points.len() >= u32::MAX as usize {
@@ -167,6 +203,11 @@ pub fn check_points(points: &[Vec3]) -> Result<(), Error> {
         Some(at) => Err(Error::NotFinite { what: "point", at }),
         None => Ok(()),
     }
+}
+
+/// Refuses radii that no index is built for.
+pub fn check_radius(radius: f32) -> Result<(), Error> {
+    if radius >= 0.0 { Ok(()) } else { Err(Error::BuiltRadius(radius)) }
 }
 
 /// Tests every point: the oracle of the others.
@@ -184,9 +225,10 @@ impl RadiusSearch for BruteForce<'_> {
         radius: f32,
         mut visit: impl FnMut(u32, f32) -> ControlFlow<B>,
     ) -> ControlFlow<B> {
+        let radius2 = radius2(radius);
         for (i, &p) in self.0.iter().enumerate() {
             let d2 = distance2(p, centre);
-            if d2 <= radius * radius {
+            if d2 <= radius2 {
                 visit(i as u32, d2)?;
             }
         }

@@ -1,36 +1,9 @@
 //! Where the CPU and the GPU meet: the stages of an iteration.
 
+pub use crate::device::Error;
 use crate::layout::{Camera, EyeVertex, Frame, Photon};
 
 use super::Film;
-
-/// What can go wrong in a backend.
-#[derive(Debug, thiserror::Error)]
-pub enum Error {
-    /// The device failed or was lost.
-    #[error("{device}: {message}")]
-    Device {
-        /// Name of the device.
-        device: String,
-        /// What it said.
-        message: String,
-    },
-    /// Something is larger than the device allows.
-    #[error("{what} needs {needed} bytes, but {device} allows {allowed}")]
-    TooLarge {
-        /// What would not fit.
-        what: String,
-        /// Bytes.
-        needed: u64,
-        /// Bytes.
-        allowed: u64,
-        /// Name of the device.
-        device: String,
-    },
-    /// No adapter, or none that fits what was asked for.
-    #[error("{0}")]
-    NoDevice(String),
-}
 
 /// Seconds each stage of the last iteration took; on a GPU from timestamps where the adapter has them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -3,15 +3,16 @@
 use std::path::Path;
 
 /// Each module with those it may use.
-const ALLOWED: [(&str, &[&str]); 9] = [
+const ALLOWED: [(&str, &[&str]); 10] = [
     ("math", &[]),
     ("index", &["math"]),
+    ("device", &["index"]),
     ("points", &["index", "math"]),
     ("layout", &["index", "math"]),
     ("scene", &["layout", "index", "math"]),
-    ("ppm", &["scene", "layout", "index", "math"]),
-    ("cpu", &["ppm", "scene", "layout", "index", "math"]),
-    ("gpu", &["ppm", "scene", "layout", "index", "math"]),
+    ("ppm", &["scene", "layout", "device", "index", "math"]),
+    ("cpu", &["ppm", "scene", "layout", "device", "index", "math"]),
+    ("gpu", &["ppm", "scene", "layout", "device", "index", "math"]),
     ("output", &["ppm", "scene", "layout", "index", "math"]),
 ];
 

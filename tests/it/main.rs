@@ -3,10 +3,15 @@
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod backends;
 #[cfg(feature = "render")]
+mod bench;
+#[cfg(feature = "render")]
 mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
+#[cfg(feature = "gpu")]
+mod gpu_search;
 mod index;
+mod indices;
 mod layering;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod layout;

@@ -1,21 +1,30 @@
 //! The stages of an iteration on a GPU.
 
+mod photons;
+mod probe;
+mod scene;
+
 use std::sync::Arc;
 
+use photons::PhotonPaths;
+pub use probe::{BsdfAnswer, BsdfQuery};
+use scene::SceneBuffers;
+
+use super::Method;
 use super::buffers::{Array, Readback};
 use super::context::Context;
-use super::index::Index;
-use super::kernels::{Access, Batch, Kernel, Modules, Shared};
-use super::photons::PhotonPaths;
-use super::probe::{self, BsdfAnswer, BsdfQuery};
-use super::scene::SceneBuffers;
-use super::timer::{Stage, Timer};
+use super::hardware::Hardware;
+use super::index::{Index, Sorted};
+use super::kernels::{ACCELERATION_STRUCTURE, Access, Batch, Kernel, Modules, Shared};
+use super::timer::Timer;
 use crate::layout::{Camera, EyeVertex, Frame, Photon, PointBox};
 use crate::ppm::{Error, Film, StageTimes, Stages};
 use crate::scene::PackedScene;
 
 /// Threads a workgroup.
 const THREADS: u32 = 64;
+/// Words of a photon, whose position comes first.
+const PHOTON_WORDS: u32 = (size_of::<Photon>() / 4) as u32;
 /// The film is cut at multiples of this many rows, so that the address of any part of a per-pixel array is aligned.
 const ROW_STEP: u32 = 64;
 /// Pixels of the first dispatches, before anything is known about the device's speed.
@@ -25,25 +34,38 @@ const MOST_PIXELS: u32 = 1 << 19;
 /// Seconds a dispatch may take, well below what watchdogs allow.
 const DISPATCH_SECONDS: f64 = 0.1;
 
+// The stages that are timed.
+const EYE: usize = 0;
+const PHOTONS: usize = 1;
+const BUILD: usize = 2;
+const GATHER: usize = 3;
+const ACCUMULATE: usize = 4;
+const N_STAGES: usize = 5;
+
 /// The GPU backend.
 pub struct GpuStages {
     context: Arc<Context>,
     shared: Shared,
+    scene: SceneBuffers,
     camera: Camera,
     trace_eye: Arc<Kernel>,
     paths: PhotonPaths,
     index: Index,
+    /// What searches instead of the index's tree; the photons are in its order all the same.
+    hardware: Option<Hardware>,
     gather: Arc<Kernel>,
     accumulate: Arc<Kernel>,
     eye_vertices: Array,
     first_radii: Array,
+    /// The largest of them, metres, and its pixel.
+    largest_radius: (f32, usize),
     radiance: Array,
     film: Array,
     photons: Array,
     /// The other half of a pair: photons before or after sorting.
     other_photons: Array,
     readback: Readback,
-    timer: Timer,
+    timer: Timer<N_STAGES>,
     n_pixels: u32,
     n_photons: u32,
     film_size: [u32; 2],
@@ -57,26 +79,47 @@ pub struct GpuStages {
 impl GpuStages {
     /// Puts the scene on the device.
     pub fn new(context: Arc<Context>, scene: &PackedScene, camera: Camera) -> Result<Self, Error> {
+        Self::with_method(context, scene, camera, Method::Tree)
+    }
+
+    /// The same; `method` finds the photons around an eye vertex.
+    pub fn with_method(
+        context: Arc<Context>,
+        scene: &PackedScene,
+        camera: Camera,
+        method: Method,
+    ) -> Result<Self, Error> {
         use Access::{Read, Write};
-        let shared = Shared::new(&context, SceneBuffers::new(&context, scene, &camera)?);
+        let (scene, groups) = SceneBuffers::new(&context, scene, &camera)?;
+        let shared = Shared::new(&context, groups);
         let modules = Modules::new(&context, &shared);
         let trace_eye = modules.kernel("eye", "trace_eye", &[Write])?;
         let paths = PhotonPaths::new(&modules)?;
-        let index = Index::new(&modules)?;
-        let gather = modules.kernel("gather", "gather", &[Read, Read, Read, Read, Write])?;
+        let index = Index::new(&modules, &Sorted { permute: ("permute", "permute"), words: PHOTON_WORDS })?;
+        let (gather, hardware) = match method {
+            Method::Tree => (modules.kernel("gather", "gather", &[Read, Read, Read, Read, Write])?, None),
+            Method::Hardware => {
+                let hardware = Hardware::new(&context, &modules)?;
+                let bindings = [Read.into(), Read.into(), Read.into(), ACCELERATION_STRUCTURE, Write.into()];
+                (modules.kernel("gather_hardware", "gather", &bindings)?, Some(hardware))
+            }
+        };
         let accumulate = modules.kernel("accumulate", "accumulate", &[Read, Write])?;
         let timer = Timer::new(&context);
         Ok(Self {
             context,
             shared,
+            scene,
             camera,
             trace_eye,
             paths,
             index,
+            hardware,
             gather,
             accumulate,
             eye_vertices: Array::in_ranges::<EyeVertex>("eye vertices"),
             first_radii: Array::in_ranges::<f32>("first radii"),
+            largest_radius: (0.0, 0),
             radiance: Array::in_ranges::<[f32; 4]>("radiance"),
             film: Array::in_ranges::<[f32; 4]>("film"),
             photons: Array::new::<Photon>("photons"),
@@ -108,7 +151,7 @@ impl GpuStages {
         (0..height).step_by(rows as usize).map(move |first| (first, rows.min(height - first)))
     }
 
-    /// The boxes of the tree, all levels, leaves first.
+    /// The boxes of the tree, all levels, leaves first; none where ray queries search.
     pub fn tree(&mut self) -> Result<Vec<PointBox>, Error> {
         let n = self.index.levels.last().map_or(0, |[first, n]| first + n);
         self.read(Source::Boxes, n)
@@ -169,9 +212,9 @@ impl Stages for GpuStages {
     fn trace_eye(&mut self, frame: &Frame) -> Result<(), Error> {
         let n_pixels = frame.width * frame.height;
         self.reserve_pixels(n_pixels)?;
-        self.shared.set_frame(&self.context, frame);
+        self.scene.set_frame(&self.context, frame);
         let mut batch = Batch::new(&self.context, &self.shared, "eye");
-        self.timer.begin(Stage::Eye, &mut batch);
+        self.timer.begin(EYE, &mut batch);
         for (first, rows) in Self::chunks(frame, self.eye_chunk) {
             if first > 0 {
                 batch.submit()?;
@@ -180,13 +223,14 @@ impl Stages for GpuStages {
             let buffers = [self.eye_vertices.range(first * frame.width, rows * frame.width)];
             batch.dispatch(&self.trace_eye, &buffers, [rows, first, 0, 0], tiles(frame.width, rows));
         }
-        self.timer.end(Stage::Eye, batch, &self.context)
+        self.timer.end(EYE, batch, &self.context)
     }
 
     fn trace_photons(&mut self, frame: &Frame) -> Result<(), Error> {
         self.n_photons = self.paths.trace(
             &self.context,
             &self.shared,
+            &self.scene,
             frame,
             &mut self.photons,
             &mut self.readback,
@@ -199,23 +243,48 @@ impl Stages for GpuStages {
         let n = self.n_photons;
         self.photons.reserve(&self.context, u64::from(n))?;
         self.other_photons.reserve(&self.context, self.photons.capacity())?;
-        self.index.reserve(&self.context, n)?;
-        self.shared.set_frame(&self.context, frame);
+        match &mut self.hardware {
+            None => self.index.reserve(&self.context, n)?,
+            Some(hardware) => {
+                self.index.reserve_sort(&self.context, n)?;
+                hardware.reserve(&self.context, n)?;
+            }
+        }
+        self.scene.set_frame(&self.context, frame);
         let mut batch = Batch::new(&self.context, &self.shared, "build");
-        self.timer.begin(Stage::Build, &mut batch);
-        self.index.build(&mut batch, n, &self.photons, &self.other_photons);
-        self.timer.end(Stage::Build, batch, &self.context)?;
+        self.timer.begin(BUILD, &mut batch);
+        let photons = self.photons.all();
+        match &mut self.hardware {
+            None => self.index.build(&mut batch, n, &photons, PHOTON_WORDS, &self.other_photons),
+            Some(hardware) => {
+                if n > 0 {
+                    self.index.sort(&mut batch, n, &photons, PHOTON_WORDS, &self.other_photons);
+                }
+                let radius = self.largest_radius.0 * frame.radius_scale;
+                hardware.build(&mut batch, n, &self.other_photons, PHOTON_WORDS, radius);
+            }
+        }
+        self.timer.end(BUILD, batch, &self.context)?;
         std::mem::swap(&mut self.photons, &mut self.other_photons);
         Ok(())
     }
 
     fn gather(&mut self, frame: &Frame) -> Result<(), Error> {
         self.check_pixels(frame)?;
-        self.index.reserve(&self.context, 0)?;
         self.photons.reserve(&self.context, 0)?;
-        self.shared.set_frame(&self.context, frame);
+        let tree = match &self.hardware {
+            None => {
+                self.index.reserve(&self.context, 0)?;
+                self.index.nodes.all()
+            }
+            Some(hardware) => {
+                let (largest, query) = self.largest_radius;
+                hardware.tree(&self.context, query, largest * frame.radius_scale)?
+            }
+        };
+        self.scene.set_frame(&self.context, frame);
         let mut batch = Batch::new(&self.context, &self.shared, "gather");
-        self.timer.begin(Stage::Gather, &mut batch);
+        self.timer.begin(GATHER, &mut batch);
         for (first, rows) in Self::chunks(frame, self.gather_chunk) {
             if first > 0 {
                 batch.submit()?;
@@ -226,20 +295,20 @@ impl Stages for GpuStages {
                 self.eye_vertices.range(first, n),
                 self.first_radii.range(first, n),
                 self.photons.all(),
-                self.index.boxes.all(),
+                tree.clone(),
                 self.radiance.range(first, n),
             ];
-            let arguments = self.index.arguments([rows, self.n_photons, 0, 0]);
+            let arguments = self.index.arguments([rows, self.n_photons, self.index.levels.len() as u32, 0]);
             batch.dispatch(&self.gather, &buffers, arguments, tiles(frame.width, rows));
         }
-        self.timer.end(Stage::Gather, batch, &self.context)
+        self.timer.end(GATHER, batch, &self.context)
     }
 
     fn accumulate(&mut self, frame: &Frame) -> Result<(), Error> {
         self.check_pixels(frame)?;
-        self.shared.set_frame(&self.context, frame);
+        self.scene.set_frame(&self.context, frame);
         let mut batch = Batch::new(&self.context, &self.shared, "accumulate");
-        self.timer.begin(Stage::Accumulate, &mut batch);
+        self.timer.begin(ACCUMULATE, &mut batch);
         if frame.iteration <= 1 {
             batch.encoder().clear_buffer(self.film.raw(), 0, None);
         }
@@ -248,7 +317,7 @@ impl Stages for GpuStages {
             let buffers = [self.radiance.range(first, n), self.film.range(first, n)];
             batch.dispatch(&self.accumulate, &buffers, [n, 0, 0, 0], n.div_ceil(THREADS));
         }
-        self.timer.end(Stage::Accumulate, batch, &self.context)?;
+        self.timer.end(ACCUMULATE, batch, &self.context)?;
         self.film_size = [frame.width, frame.height];
         self.n_iterations = frame.iteration;
         Ok(())
@@ -256,6 +325,8 @@ impl Stages for GpuStages {
 
     fn set_first_radii(&mut self, radii: &[f32]) -> Result<(), Error> {
         self.reserve_pixels(radii.len() as u32)?;
+        let larger = |a: (f32, usize), b: (f32, usize)| if b.0 > a.0 { b } else { a };
+        self.largest_radius = radii.iter().copied().zip(0..).fold((0.0, 0), larger);
         self.first_radii.write(&self.context, radii)
     }
 
@@ -294,7 +365,9 @@ impl Stages for GpuStages {
     }
 
     fn times(&mut self) -> Result<StageTimes, Error> {
-        let times = self.timer.read(&self.context, &self.shared, &mut self.readback)?;
+        let [eye, photons, build, gather, accumulate] =
+            self.timer.read(&self.context, &self.shared, &mut self.readback)?;
+        let times = StageTimes { eye, photons, build, gather, accumulate };
         for (seconds, chunk) in [(times.eye, &mut self.eye_chunk), (times.gather, &mut self.gather_chunk)] {
             if seconds > 0.0 {
                 *chunk = (f64::from(self.n_pixels) * DISPATCH_SECONDS / seconds).min(f64::from(MOST_PIXELS)) as u32;

@@ -2,11 +2,11 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::buffers::{Array, Readback};
-use super::context::Context;
-use super::kernels::{Access, Batch, Modules, Shared};
+use crate::device::Error;
+use crate::gpu::buffers::{Array, Readback};
+use crate::gpu::context::Context;
+use crate::gpu::kernels::{Access, Batch, Modules, Shared};
 use crate::layout::EyeVertex;
-use crate::ppm::Error;
 
 /// What to ask. Twin of the struct in `shaders/probe.wgsl`.
 #[repr(C)]

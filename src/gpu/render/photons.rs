@@ -2,12 +2,14 @@
 
 use std::sync::Arc;
 
-use super::buffers::{Array, Readback};
-use super::context::Context;
-use super::kernels::{Access, Batch, Kernel, Modules, Shared};
-use super::timer::{Stage, Timer};
+use super::scene::SceneBuffers;
+use super::{N_STAGES, PHOTONS};
+use crate::device::Error;
+use crate::gpu::buffers::{Array, Readback};
+use crate::gpu::context::Context;
+use crate::gpu::kernels::{Access, Batch, Kernel, Modules, Shared};
+use crate::gpu::timer::Timer;
 use crate::layout::{Frame, Photon};
-use crate::ppm::Error;
 
 /// As in `shaders/lib/photon_paths.wgsl`.
 const CHUNK: u32 = 65536;
@@ -53,10 +55,11 @@ impl PhotonPaths {
         &mut self,
         context: &Context,
         shared: &Shared,
+        scene: &SceneBuffers,
         frame: &Frame,
         photons: &mut Array,
         readback: &mut Readback,
-        timer: &mut Timer,
+        timer: &mut Timer<N_STAGES>,
     ) -> Result<u32, Error> {
         self.slots.reserve(context, u64::from(CHUNK * SLOTS))?;
         self.counters.reserve(context, u64::from(N_TOTALS + CHUNK + 2 * CHUNK / THREADS))?;
@@ -69,7 +72,7 @@ impl PhotonPaths {
         loop {
             self.rounds = self.rounds.min(most_rounds);
             let room = photons.capacity().min(u64::from(u32::MAX)) as u32;
-            self.record(context, shared, frame, photons, room, timer)?;
+            self.record(context, shared, scene, frame, photons, room, timer)?;
             let totals: Vec<u32> = readback.read(context, shared, self.counters.raw(), N_TOTALS as usize)?;
             let [n, _, unfinished, _] = totals[..] else { unreachable!("four words were asked for") };
             if unfinished > 0 && self.rounds < most_rounds {
@@ -90,14 +93,15 @@ impl PhotonPaths {
         &self,
         context: &Context,
         shared: &Shared,
+        scene: &SceneBuffers,
         frame: &Frame,
         photons: &Array,
         room: u32,
-        timer: &mut Timer,
+        timer: &mut Timer<N_STAGES>,
     ) -> Result<(), Error> {
-        shared.set_frame(context, frame);
+        scene.set_frame(context, frame);
         let mut batch = Batch::new(context, shared, "photons");
-        timer.begin(Stage::Photons, &mut batch);
+        timer.begin(PHOTONS, &mut batch);
         batch.encoder().clear_buffer(self.counters.raw(), 0, Some(u64::from(4 * N_TOTALS)));
         for first in (0..frame.n_paths).step_by((CHUNK * PATHS) as usize) {
             if first > 0 {
@@ -116,6 +120,6 @@ impl PhotonPaths {
                 batch.dispatch(&self.write, &buffers, [room, 0, 0, 0], groups);
             }
         }
-        timer.end(Stage::Photons, batch, context)
+        timer.end(PHOTONS, batch, context)
     }
 }

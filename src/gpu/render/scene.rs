@@ -2,10 +2,11 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::buffers::Array;
-use super::context::Context;
-use crate::layout::{Camera, LIGHT_AREA, LIGHT_ENVIRONMENT, Primitive, SceneInfo, SceneNode, Vertex};
-use crate::ppm::Error;
+use crate::device::Error;
+use crate::gpu::buffers::Array;
+use crate::gpu::context::Context;
+use crate::gpu::kernels::{Access, Group, storage, uniform};
+use crate::layout::{Camera, Frame, LIGHT_AREA, LIGHT_ENVIRONMENT, Primitive, SceneInfo, SceneNode, Vertex};
 use crate::scene::PackedScene;
 
 /// Where things lie in the table of small things; twin of `Tables` in `shaders/lib/scene.wgsl`.
@@ -22,19 +23,16 @@ pub(super) struct Tables {
     has_extended: u32,
 }
 
-/// Buffers of a scene; they do not change.
+/// Buffers of a scene, which do not change, and the constants of the iteration, which do.
 pub(super) struct SceneBuffers {
-    pub(super) layout: wgpu::BindGroupLayout,
-    pub(super) group: wgpu::BindGroup,
-    pub(super) camera: wgpu::Buffer,
-    pub(super) info: wgpu::Buffer,
-    pub(super) tables: wgpu::Buffer,
+    frame: wgpu::Buffer,
     /// Kept for the memory they account for.
     _arrays: [Array; 6],
 }
 
 impl SceneBuffers {
-    pub(super) fn new(context: &Context, scene: &PackedScene, camera: &Camera) -> Result<Self, Error> {
+    /// The buffers, and the bind groups 2 and 3 of the kernels.
+    pub(super) fn new(context: &Context, scene: &PackedScene, camera: &Camera) -> Result<(Self, Vec<Group>), Error> {
         let mut table: Vec<[u32; 4]> = Vec::new();
         let mut append = |bytes: &[u8]| {
             let first = table.len() as u32;
@@ -67,42 +65,27 @@ impl SceneBuffers {
         arrays[4].write(context, &scene.environment)?;
         arrays[5].write(context, &table)?;
 
-        let entries: Vec<_> = (0..arrays.len() as u32)
-            .map(|binding| wgpu::BindGroupLayoutEntry {
-                binding,
-                visibility: wgpu::ShaderStages::COMPUTE,
-                ty: wgpu::BindingType::Buffer {
-                    ty: wgpu::BufferBindingType::Storage { read_only: true },
-                    has_dynamic_offset: false,
-                    min_binding_size: None,
-                },
-                count: None,
-            })
-            .collect();
-        let descriptor = wgpu::BindGroupLayoutDescriptor { label: Some("scene"), entries: &entries };
-        let layout = context.device.create_bind_group_layout(&descriptor);
-        let entries: Vec<_> = arrays
-            .iter()
-            .enumerate()
-            .map(|(binding, array)| wgpu::BindGroupEntry { binding: binding as u32, resource: array.all() })
-            .collect();
-        let group = context.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("scene"),
-            layout: &layout,
-            entries: &entries,
-        });
-        Ok(Self {
-            layout,
-            group,
-            camera: uniform(context, "camera", camera),
-            info: uniform::<SceneInfo>(context, "scene", &scene.info),
-            tables: uniform(context, "tables", &tables),
-            _arrays: arrays,
-        })
+        let uniforms = [
+            constant(context, "frame", &Frame::zeroed()),
+            constant(context, "camera", camera),
+            constant::<SceneInfo>(context, "scene", &scene.info),
+            constant(context, "tables", &tables),
+        ];
+        let bindings = uniforms.each_ref().map(|buffer| (uniform(buffer.size(), false), buffer.as_entire_binding()));
+        let constants = Group::new(context, "constants", &bindings);
+        let bindings = arrays.each_ref().map(|array| (storage(Access::Read), array.all()));
+        let groups = vec![constants, Group::new(context, "scene", &bindings)];
+        let [frame, ..] = uniforms;
+        Ok((Self { frame, _arrays: arrays }, groups))
+    }
+
+    /// Constants of the dispatches submitted from now on.
+    pub(super) fn set_frame(&self, context: &Context, frame: &Frame) {
+        context.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(frame));
     }
 }
 
-fn uniform<T: Pod>(context: &Context, label: &str, value: &T) -> wgpu::Buffer {
+fn constant<T: Pod>(context: &Context, label: &str, value: &T) -> wgpu::Buffer {
     let buffer = context.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
         size: size_of::<T>() as u64,
