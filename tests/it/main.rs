@@ -3,6 +3,8 @@
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod backends;
 #[cfg(feature = "render")]
+mod bench;
+#[cfg(feature = "render")]
 mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;

@@ -69,6 +69,8 @@ pub enum Command {
     #[command(after_help = "relMSE is the mean over pixels and channels of (x - y)² / (y² + 0.01); \
         the trimmed one leaves out the worst 0.1 % of the pixels.")]
     Compare(CompareArgs),
+    /// Make the evaluation of the neighbour search again: figures and tables
+    Bench(crate::bench::BenchArgs),
     /// Geometry tasks on point clouds: normals, correspondence, registration
     Points(points::PointsArgs),
 }
@@ -268,7 +270,7 @@ fn crop(text: &str) -> Result<Crop, String> {
     Ok(Crop([x0, x1, y0, y1]))
 }
 
-fn size(text: &str) -> Result<[u32; 2], String> {
+pub fn size(text: &str) -> Result<[u32; 2], String> {
     let (width, height) = text.split_once(['x', 'X', '×']).ok_or("a size looks like 1280x720")?;
     let side = |t: &str| match t.trim().parse() {
         Ok(n) if (1..=MAX_SIDE).contains(&n) => Ok(n),

@@ -41,6 +41,32 @@ pub fn open(args: &RenderArgs, progress: &Progress) -> Result<Device> {
     }
 }
 
+/// `cpu`, or `gpu`: the best adapter there is.
+#[cfg(feature = "gpu")]
+pub fn open_backend(name: &str) -> Result<Device> {
+    if name == "cpu" {
+        return Ok(Device::Cpu);
+    }
+    Ok(Device::Gpu(Arc::new(Context::new(&Choice::Any)?), Method::Tree))
+}
+
+/// `cpu`: there is no other.
+#[cfg(not(feature = "gpu"))]
+pub fn open_backend(name: &str) -> Result<Device> {
+    match name {
+        "cpu" => Ok(Device::Cpu),
+        _ => bail!("this sunfleck was built without the GPU backend"),
+    }
+}
+
+/// Whether there is a GPU that is not software.
+pub fn has_real_gpu() -> bool {
+    #[cfg(feature = "gpu")]
+    return gpu::list_devices().iter().any(gpu::DeviceInfo::is_real);
+    #[cfg(not(feature = "gpu"))]
+    false
+}
+
 #[cfg(not(feature = "gpu"))]
 fn open_gpu(args: &RenderArgs, _: &Progress) -> Result<Device> {
     match args.backend == "gpu" || args.device.is_some() || args.index != "tree" {

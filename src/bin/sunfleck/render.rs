@@ -63,7 +63,7 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode> {
 }
 
 /// Runs the pilot; for one radius everywhere, again with the median of what it chose.
-fn start(stages: &mut dyn Stages, params: &Params, one_radius: bool) -> Result<Vec<f32>> {
+pub fn start(stages: &mut dyn Stages, params: &Params, one_radius: bool) -> Result<Vec<f32>> {
     let radii = ppm::start(stages, params)?;
     if !one_radius {
         return Ok(radii);
@@ -335,7 +335,7 @@ fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
 }
 
 /// As it could be typed again.
-fn command_line() -> String {
+pub fn command_line() -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_=./,:+%@".contains(c);
     let quote = |arg: String| match arg.chars().all(plain) && !arg.is_empty() {
         true => arg,
