@@ -9,6 +9,8 @@ mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
 #[cfg(feature = "gpu")]
+mod gpu_hardware;
+#[cfg(feature = "gpu")]
 mod gpu_search;
 mod index;
 mod indices;
