@@ -28,6 +28,17 @@ pub enum Error {
     /// No adapter, or none that fits what was asked for.
     #[error("{0}")]
     NoDevice(String),
+    /// A custom visitor does not compile; the message names the line.
+    #[error("{0}")]
+    Shader(String),
+    /// A buffer that was passed in cannot be used.
+    #[error("the buffer of {what} {problem}")]
+    Buffer {
+        /// What is in it.
+        what: &'static str,
+        /// What is wrong with it.
+        problem: String,
+    },
     /// What was asked of a neighbour search makes no sense.
     #[error(transparent)]
     Search(#[from] index::Error),

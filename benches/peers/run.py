@@ -16,13 +16,13 @@ HERE = pathlib.Path(__file__).resolve().parent
 OUT = HERE.parents[1] / "target" / "peers"
 
 # Library: what runs it, and where its version is said if it does not say it itself.
-RUST = ["sunfleck", "sunfleck-single", "kiddo", "obvhs-ploc", "obvhs-medium", "rstar"]
+RUST = ["sunfleck", "sunfleck-single", "sunfleck-grid", "kiddo", "obvhs-ploc", "obvhs-medium", "rstar"]
 CPP = ["embree", "flann", "nanoflann"]
 LIBRARIES = RUST + CPP + ["scipy"]
 TITLES = {
     "sunfleck": "Sunfleck, `PointBvh`, batch",
     "sunfleck-single": "Sunfleck, `PointBvh`, query by query",
-    "sunfleck-grid": "Sunfleck, `Grid`, sorted queries (the bar)",
+    "sunfleck-grid": "Sunfleck, `HashGrid`, sorted queries",
     "kiddo": "kiddo, `ImmutableKdTree`",
     "obvhs-ploc": "obvhs, PLOC, boxes grown by r",
     "obvhs-medium": "obvhs, medium quality, boxes grown by r",
@@ -36,7 +36,7 @@ RADII = ["0.005", "0.01", "0.02", "0.05"]
 KS = [1, 4, 8]
 KNN_RADIUS = "0.02"
 # Queries of the first round; all libraries give their sums of these.
-WARM_UP = 16384
+WARM_UP = 4096
 # Neighbours at the very edge of the ball may fall on either side: fused multiply-add, or double precision.
 TOLERANCE = 2e-5
 

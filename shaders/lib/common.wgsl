@@ -4,8 +4,10 @@
 struct Arguments {
     // What each kernel says it is.
     values: vec4<u32>,
-    // Tree over photons: (first box, number of boxes) of two levels in each.
+    // Tree over points: (first box, number of boxes) of two levels in each.
     levels: array<vec4<u32>, 6>,
+    // What each kernel says it is.
+    further: vec4<u32>,
 }
 
 @group(1) @binding(0) var<uniform> arguments: Arguments;

@@ -25,7 +25,14 @@ impl Array {
         Self { what, stride: size_of::<T>() as u64, usage, whole: true, buffer: None }
     }
 
+    /// Empty; boxes of two corners each, over which the device can build its tree.
+    pub(super) fn of_boxes(what: &'static str) -> Self {
+        let array = Self::new::<[f32; 6]>(what);
+        Self { usage: array.usage | wgpu::BufferUsages::BLAS_INPUT, ..array }
+    }
+
     /// Empty; shaders see a range of it at a time.
+    #[cfg(feature = "render")]
     pub(super) fn in_ranges<T>(what: &'static str) -> Self {
         Self { whole: false, ..Self::new::<T>(what) }
     }
@@ -58,6 +65,7 @@ impl Array {
     }
 
     /// `n` elements from `first` on, whose address is a multiple of 256 bytes.
+    #[cfg(feature = "render")]
     pub(super) fn range(&self, first: u32, n: u32) -> wgpu::BindingResource<'_> {
         wgpu::BindingResource::Buffer(wgpu::BufferBinding {
             buffer: self.raw(),
@@ -97,6 +105,18 @@ impl Readback {
         from: &wgpu::Buffer,
         n: usize,
     ) -> Result<Vec<T>, Error> {
+        self.read_from(context, shared, from, 0, n)
+    }
+
+    /// `n` elements from a byte on; waits for the device.
+    pub(super) fn read_from<T: Pod>(
+        &mut self,
+        context: &Context,
+        shared: &super::kernels::Shared,
+        from: &wgpu::Buffer,
+        first_byte: u64,
+        n: usize,
+    ) -> Result<Vec<T>, Error> {
         let mut elements = vec![T::zeroed(); n];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut elements);
         let piece = bytes.len().min(PIECE).next_multiple_of(16) as u64;
@@ -108,7 +128,7 @@ impl Readback {
         let buffer = &self.buffer.as_ref().expect("made above").raw;
         for (i, part) in bytes.chunks_mut(PIECE).enumerate() {
             let mut batch = Batch::new(context, shared, "readback");
-            batch.encoder().copy_buffer_to_buffer(from, (i * PIECE) as u64, buffer, 0, part.len() as u64);
+            batch.encoder().copy_buffer_to_buffer(from, first_byte + (i * PIECE) as u64, buffer, 0, part.len() as u64);
             batch.submit()?;
             let slice = buffer.slice(..part.len() as u64);
             let (sender, receiver) = mpsc::channel();

@@ -36,7 +36,7 @@ impl std::fmt::Display for DeviceKind {
 /// An adapter that can be rendered with.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DeviceInfo {
-    /// For [`Choice::Index`].
+    /// For [`Choice::Index`]; `usize::MAX` for a device of the caller's own.
     pub index: usize,
     /// As the driver gives it.
     pub name: String,
@@ -46,9 +46,24 @@ pub struct DeviceInfo {
     pub kind: DeviceKind,
     /// Driver and its version.
     pub driver: String,
+    /// Whether it has ray queries, for [`Context::with_ray_queries`].
+    pub ray_queries: bool,
 }
 
 impl DeviceInfo {
+    fn new(index: usize, info: wgpu::AdapterInfo, features: wgpu::Features) -> Self {
+        let kind = match info.device_type {
+            wgpu::DeviceType::DiscreteGpu => DeviceKind::Discrete,
+            wgpu::DeviceType::IntegratedGpu => DeviceKind::Integrated,
+            wgpu::DeviceType::VirtualGpu => DeviceKind::Virtual,
+            wgpu::DeviceType::Cpu => DeviceKind::Cpu,
+            wgpu::DeviceType::Other => DeviceKind::Other,
+        };
+        let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
+        let ray_queries = features.contains(RAY_QUERIES);
+        Self { index, name: info.name, backend: info.backend.to_string(), kind, driver, ray_queries }
+    }
+
     /// Whether this is hardware.
     pub fn is_real(&self) -> bool {
         matches!(self.kind, DeviceKind::Discrete | DeviceKind::Integrated | DeviceKind::Virtual)
@@ -60,6 +75,9 @@ impl std::fmt::Display for DeviceInfo {
         write!(f, "{} ({}, {}", self.name, self.backend, self.kind)?;
         if !self.driver.is_empty() {
             write!(f, ", {}", self.driver)?;
+        }
+        if self.ray_queries {
+            f.write_str(", ray queries")?;
         }
         f.write_str(")")
     }
@@ -94,36 +112,57 @@ fn adapters() -> Vec<(DeviceInfo, wgpu::Adapter)> {
         found.retain(can_compute);
     }
     let describe = |(index, adapter): (usize, wgpu::Adapter)| {
-        let info = adapter.get_info();
-        let kind = match info.device_type {
-            wgpu::DeviceType::DiscreteGpu => DeviceKind::Discrete,
-            wgpu::DeviceType::IntegratedGpu => DeviceKind::Integrated,
-            wgpu::DeviceType::VirtualGpu => DeviceKind::Virtual,
-            wgpu::DeviceType::Cpu => DeviceKind::Cpu,
-            wgpu::DeviceType::Other => DeviceKind::Other,
-        };
-        let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
-        (DeviceInfo { index, name: info.name, backend: info.backend.to_string(), kind, driver }, adapter)
+        (DeviceInfo::new(index, adapter.get_info(), adapter.features()), adapter)
     };
     found.into_iter().enumerate().map(describe).collect()
 }
 
+const RAY_QUERIES: wgpu::Features = wgpu::Features::EXPERIMENTAL_RAY_QUERY;
+
 fn can_compute(adapter: &wgpu::Adapter) -> bool {
     adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
-        && missing_limit(&adapter.limits()).is_none()
+        && missing_limit(&adapter.limits(), RENDER_BUFFERS).is_none()
+}
+
+/// Storage buffers the widest kernel of the renderer sees.
+const RENDER_BUFFERS: u32 = 11;
+/// The same of the search, without buffers of a custom visitor.
+const SEARCH_BUFFERS: u32 = 8;
+/// Bytes of workgroup memory the widest kernel uses.
+const WORKGROUP_BYTES: u32 = 20 << 10;
+
+/// Limits with which a device of one's own can be opened for [`Context::from_device`]: wgpu's defaults where they are
+/// enough. Those of the adapter, where they are higher, allow more points and more buffers in a custom visitor.
+pub fn required_limits() -> wgpu::Limits {
+    let defaults = wgpu::Limits::default();
+    wgpu::Limits {
+        max_storage_buffers_per_shader_stage: defaults.max_storage_buffers_per_shader_stage.max(SEARCH_BUFFERS),
+        max_compute_workgroup_storage_size: defaults.max_compute_workgroup_storage_size.max(WORKGROUP_BYTES),
+        ..defaults
+    }
 }
 
 /// The first of our needs that these limits do not meet.
-fn missing_limit(limits: &wgpu::Limits) -> Option<(&'static str, u64, u64)> {
+fn missing_limit(limits: &wgpu::Limits, buffers: u32) -> Option<(&'static str, u64, u64)> {
     [
-        ("storage buffers a shader", 11, u64::from(limits.max_storage_buffers_per_shader_stage)),
-        ("bytes of workgroup memory", 20 << 10, u64::from(limits.max_compute_workgroup_storage_size)),
+        ("storage buffers a shader", u64::from(buffers), u64::from(limits.max_storage_buffers_per_shader_stage)),
+        ("bytes of workgroup memory", u64::from(WORKGROUP_BYTES), u64::from(limits.max_compute_workgroup_storage_size)),
         ("threads a workgroup", 64, u64::from(limits.max_compute_invocations_per_workgroup)),
         ("bytes in a storage binding", 1 << 27, limits.max_storage_buffer_binding_size),
     ]
     .into_iter()
     .find(|(_, needed, allowed)| allowed < needed)
 }
+
+fn check_limits(info: &DeviceInfo, limits: &wgpu::Limits, buffers: u32) -> Result<(), Error> {
+    let missing = missing_limit(limits, buffers);
+    missing.map_or(Ok(()), |(what, needed, allowed)| {
+        Err(Error::NoDevice(format!("{info} allows {allowed} {what}, {needed} are needed")))
+    })
+}
+
+const TIMESTAMPS: wgpu::Features =
+    wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
 
 /// A device, and what has gone wrong with it. The GPU's errors come late and from other threads; they are kept here and
 /// returned by the next [`Context::check`].
@@ -148,7 +187,24 @@ pub struct Context {
 impl Context {
     /// Opens a device.
     pub fn new(choice: &Choice) -> Result<Self, Error> {
+        Self::choose(choice, false)
+    }
+
+    /// Opens a device, of those that have ray queries, with that feature: [`super::Method::Hardware`] needs it. It is
+    /// experimental in wgpu, which says that it may have unsound bugs, so that it is only asked for here
+    /// (docs/adr/0007-ray-queries.md).
+    pub fn with_ray_queries(choice: &Choice) -> Result<Self, Error> {
+        Self::choose(choice, true)
+    }
+
+    fn choose(choice: &Choice, ray_queries: bool) -> Result<Self, Error> {
         let mut found = adapters();
+        let n_all = found.len();
+        found.retain(|(info, _)| info.ray_queries || !ray_queries);
+        if found.is_empty() && n_all > 0 {
+            return Err(Error::NoDevice(format!("none of {n_all} GPU adapters has ray queries")));
+        }
+        let kind = if ray_queries { " with ray queries" } else { "" };
         let list = || {
             let names: Vec<String> = list_devices().iter().map(|d| format!("{}: {d}", d.index)).collect();
             if names.is_empty() { "there is none".to_owned() } else { format!("there are {}", names.join("; ")) }
@@ -163,28 +219,31 @@ impl Context {
         };
         let Some((info, adapter)) = found.into_iter().find(|(info, _)| wanted(info)) else {
             return Err(Error::NoDevice(match choice {
-                Choice::Real => format!("no hardware GPU; {}", list()),
+                Choice::Real => format!("no hardware GPU{kind}; {}", list()),
                 Choice::Any => {
                     "no GPU adapter: no driver, or none with compute shaders (--backend cpu needs none)".to_owned()
                 }
-                Choice::Index(index) => format!("no GPU adapter {index}; {}", list()),
-                Choice::Name(part) => format!("no GPU adapter named \"{part}\"; {}", list()),
+                Choice::Index(index) => format!("no GPU adapter {index}{kind}; {}", list()),
+                Choice::Name(part) => format!("no GPU adapter named \"{part}\"{kind}; {}", list()),
             }));
         };
-        Self::open(info, &adapter)
+        Self::open(info, &adapter, ray_queries)
     }
 
-    fn open(info: DeviceInfo, adapter: &wgpu::Adapter) -> Result<Self, Error> {
+    fn open(info: DeviceInfo, adapter: &wgpu::Adapter, ray_queries: bool) -> Result<Self, Error> {
         let limits = adapter.limits();
-        if let Some((what, needed, allowed)) = missing_limit(&limits) {
-            return Err(Error::NoDevice(format!("{info} allows {allowed} {what}, {needed} are needed")));
+        check_limits(&info, &limits, RENDER_BUFFERS)?;
+        let mut features = adapter.features() & TIMESTAMPS;
+        let mut experimental_features = wgpu::ExperimentalFeatures::disabled();
+        if ray_queries {
+            features |= RAY_QUERIES;
+            experimental_features = experimental();
         }
-        let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS;
-        let features = adapter.features() & wanted;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("sunfleck"),
             required_features: features,
             required_limits: limits.clone(),
+            experimental_features,
             ..Default::default()
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
@@ -203,18 +262,46 @@ impl Context {
         let lost = record(&failure);
         device.set_device_lost_callback(move |reason, message| lost(format!("device lost ({reason:?}): {message}")));
 
+        Ok(Self::with(device, queue, info, failure))
+    }
+
+    /// Takes a device that the caller has opened, and its queue; both may go on being used elsewhere.
+    ///
+    /// [`required_limits`] are checked here. No callback of the device is touched: what goes wrong with the work that is
+    /// recorded here is caught by error scopes and returned, and only an error that wgpu raises on another thread goes to
+    /// the caller's handler (or, without one, wgpu panics). The loss of the device is told to the caller's callback;
+    /// here it shows as an error of whatever is read back next. Times are measured by timestamps if the device was opened
+    /// with `TIMESTAMP_QUERY` and `TIMESTAMP_QUERY_INSIDE_ENCODERS`, else by waiting; ray queries can be used if it was
+    /// opened with `EXPERIMENTAL_RAY_QUERY` and the adapter's limits for them.
+    pub fn from_device(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, Error> {
+        let info = DeviceInfo::new(usize::MAX, device.adapter_info(), device.features());
+        check_limits(&info, &device.limits(), SEARCH_BUFFERS)?;
+        Ok(Self::with(device, queue, info, Arc::default()))
+    }
+
+    fn with(device: wgpu::Device, queue: wgpu::Queue, info: DeviceInfo, failure: Arc<Mutex<Option<String>>>) -> Self {
         let budget = if info.is_real() { u64::MAX } else { software_budget() };
-        Ok(Self {
+        Self {
+            limits: device.limits(),
+            timestamps: device.features().contains(TIMESTAMPS),
             device,
             queue,
-            limits,
-            timestamps: features == wanted,
             kernels: Cache::default(),
             info,
             failure,
             used: Arc::new(AtomicU64::new(0)),
             budget,
-        })
+        }
+    }
+
+    /// The device, for buffers of the caller's own.
+    pub fn device(&self) -> &wgpu::Device {
+        &self.device
+    }
+
+    /// Its queue.
+    pub fn queue(&self) -> &wgpu::Queue {
+        &self.queue
     }
 
     /// What the device is.
@@ -222,9 +309,20 @@ impl Context {
         &self.info
     }
 
+    /// Whether the device was opened with ray queries.
+    pub fn ray_queries(&self) -> bool {
+        self.device.features().contains(RAY_QUERIES)
+    }
+
     /// Most bytes of one array that a shader can see.
     pub fn most_bytes_bound(&self) -> u64 {
         self.limits.max_storage_buffer_binding_size
+    }
+
+    /// Most bytes that can still be given to one array.
+    pub(super) fn most_bytes_new(&self) -> u64 {
+        let allowed = self.limits.max_storage_buffer_binding_size.min(self.limits.max_buffer_size);
+        allowed.min(self.budget.saturating_sub(self.used()))
     }
 
     /// Sets the most bytes that may lie in buffers.
@@ -256,16 +354,22 @@ impl Context {
         Error::Device { device: self.info.to_string(), message }
     }
 
+    /// An array of `needed` bytes that may have `allowed`.
+    pub(super) fn too_large(&self, what: &str, needed: u64, allowed: u64) -> Error {
+        Error::TooLarge { what: what.to_owned(), needed, allowed, device: self.info.to_string() }
+    }
+
+    /// Refuses more bytes than one binding holds.
+    pub(super) fn check_bound(&self, what: &str, bytes: u64) -> Result<(), Error> {
+        let allowed = self.limits.max_storage_buffer_binding_size;
+        if bytes > allowed { Err(self.too_large(what, bytes, allowed)) } else { Ok(()) }
+    }
+
     /// Runs what only this thread does with the device, and returns what went wrong there.
     pub(super) fn scoped<T>(&self, work: impl FnOnce() -> T) -> Result<T, wgpu::Error> {
-        let filters = [wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Validation];
-        let scopes = filters.map(|filter| self.device.push_error_scope(filter));
+        let scopes = Scopes::new(&self.device);
         let result = work();
-        let mut first = None;
-        for scope in scopes.into_iter().rev() {
-            first = first.or(pollster::block_on(scope.pop()));
-        }
-        first.map_or(Ok(result), Err)
+        scopes.first().map_or(Ok(result), Err)
     }
 
     /// Waits until the device has done all it was given.
@@ -285,14 +389,9 @@ impl Context {
         usage: wgpu::BufferUsages,
     ) -> Result<Buffer, Error> {
         let bytes = bytes.max(16).next_multiple_of(16);
-        let too_large = |needed: u64, allowed: u64| Error::TooLarge {
-            what: what.to_owned(),
-            needed,
-            allowed,
-            device: self.info.to_string(),
-        };
-        if usage.contains(wgpu::BufferUsages::STORAGE) && bound > self.limits.max_storage_buffer_binding_size {
-            return Err(too_large(bound, self.limits.max_storage_buffer_binding_size));
+        let too_large = |needed: u64, allowed: u64| self.too_large(what, needed, allowed);
+        if usage.contains(wgpu::BufferUsages::STORAGE) {
+            self.check_bound(what, bound)?;
         }
         if bytes > self.limits.max_buffer_size {
             return Err(too_large(bytes, self.limits.max_buffer_size));
@@ -311,6 +410,32 @@ impl Context {
     }
 }
 
+/// Catches what this thread does wrong with a device, until it is asked for or dropped.
+pub(super) struct Scopes(Vec<wgpu::ErrorScopeGuard>);
+
+impl Scopes {
+    pub(super) fn new(device: &wgpu::Device) -> Self {
+        let filters = [wgpu::ErrorFilter::Internal, wgpu::ErrorFilter::OutOfMemory, wgpu::ErrorFilter::Validation];
+        Self(filters.into_iter().map(|filter| device.push_error_scope(filter)).collect())
+    }
+
+    /// What went wrong first, if anything did.
+    pub(super) fn first(mut self) -> Option<wgpu::Error> {
+        let mut first = None;
+        while let Some(scope) = self.0.pop() {
+            first = first.or(pollster::block_on(scope.pop()));
+        }
+        first
+    }
+}
+
+impl Drop for Scopes {
+    fn drop(&mut self) {
+        // The last one first: any other order is refused.
+        while self.0.pop().is_some() {}
+    }
+}
+
 /// A buffer that counts against the budget while it lives.
 pub(super) struct Buffer {
     pub(super) raw: wgpu::Buffer,
@@ -321,6 +446,14 @@ impl Drop for Buffer {
     fn drop(&mut self) {
         self.used.fetch_sub(self.raw.size(), Ordering::Relaxed);
     }
+}
+
+/// What wgpu wants to hear before it gives a feature that it calls experimental.
+#[allow(unsafe_code, reason = "docs/adr/0007-ray-queries.md")]
+fn experimental() -> wgpu::ExperimentalFeatures {
+    // SAFETY: nothing to uphold; the call says that such features may have unsound bugs, which are wgpu's to mend and
+    // ours to report. The user has asked for them.
+    unsafe { wgpu::ExperimentalFeatures::enabled() }
 }
 
 /// Half of the memory that is free, where the system says, else 4 GiB.

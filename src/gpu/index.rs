@@ -1,4 +1,4 @@
-//! The implicit tree over photons: Morton order, radix sort, boxes level by level.
+//! The implicit tree over points: Morton order, radix sort, boxes level by level.
 
 use std::sync::Arc;
 
@@ -6,16 +6,14 @@ use super::buffers::Array;
 use super::context::Context;
 use super::kernels::{Access, Arguments, Batch, Kernel, Modules};
 use crate::device::Error;
-use crate::layout::{FANOUT, LEAF_SIZE, Photon, PointBox, TreeNode};
+use crate::layout::{FANOUT, LEAF_SIZE, PointBox, TreeNode};
 
-/// Photons a workgroup of `bounds.wgsl` and `sort.wgsl` handles: `BLOCK` there.
+/// Points a workgroup of `bounds.wgsl` and `sort.wgsl` handles: `BLOCK` there.
 const BLOCK: u32 = 2048;
 /// Bits of a digit in `sort.wgsl`.
 const DIGIT_BITS: u32 = 7;
 /// Digits of a 63-bit key.
 const N_PASSES: u32 = 9;
-/// Words of a photon, whose position comes first.
-const WORDS: u32 = (size_of::<Photon>() / 4) as u32;
 /// Threads a workgroup.
 const THREADS: u32 = 64;
 
@@ -32,6 +30,15 @@ pub(super) fn levels(n_points: u32) -> Vec<[u32; 2]> {
     levels
 }
 
+/// What lies in the order of the tree: records whose position comes first.
+pub(super) struct Sorted {
+    /// Module and entry point of the kernel that moves them there: reads the order and the records, writes them in that
+    /// order; its arguments are their number and the words of a record before.
+    pub(super) permute: (&'static str, &'static str),
+    /// Words of a record there.
+    pub(super) words: u32,
+}
+
 /// Kernels and memory of the build.
 pub(super) struct Index {
     bounds_of_blocks: Arc<Kernel>,
@@ -41,6 +48,7 @@ pub(super) struct Index {
     sort_scan: Arc<Kernel>,
     sort_scatter: Arc<Kernel>,
     permute: Arc<Kernel>,
+    words: u32,
     tree_leaves: Arc<Kernel>,
     tree_level: Arc<Kernel>,
     blocks: Array,
@@ -58,7 +66,7 @@ pub(super) struct Index {
 }
 
 impl Index {
-    pub(super) fn new(modules: &Modules<'_>) -> Result<Self, Error> {
+    pub(super) fn new(modules: &Modules<'_>, sorted: &Sorted) -> Result<Self, Error> {
         use Access::{Read, Write};
         let bounds = [Read, Write, Write];
         let sort = [Read, Read, Write, Write, Write, Write];
@@ -69,7 +77,8 @@ impl Index {
             sort_count: modules.kernel("sort", "sort_count", &sort)?,
             sort_scan: modules.kernel("sort", "sort_scan", &sort)?,
             sort_scatter: modules.kernel("sort", "sort_scatter", &sort)?,
-            permute: modules.kernel("permute", "permute", &[Read, Read, Write])?,
+            permute: modules.kernel(sorted.permute.0, sorted.permute.1, &[Read, Read, Write])?,
+            words: sorted.words,
             tree_leaves: modules.kernel("tree", "tree_leaves", &[Read, Write, Write])?,
             tree_level: modules.kernel("tree", "tree_level", &[Read, Write, Write])?,
             blocks: Array::new::<PointBox>("bounds of blocks of points"),
@@ -84,16 +93,20 @@ impl Index {
         })
     }
 
-    /// Makes room for `n` photons.
+    /// Makes room for the tree over `n` points.
     pub(super) fn reserve(&mut self, context: &Context, n: u32) -> Result<(), Error> {
-        // A little more than asked, for the number changes from one iteration to the next.
-        let n = u64::from(n);
-        let roomy = n + n / 16;
-        let room = |array: &mut Array, needed: u64, roomy: u64| {
-            if array.capacity() >= needed.max(1) { Ok(()) } else { array.reserve(context, roomy.max(1)) }
-        };
-        let n_blocks = |n: u64| n.div_ceil(u64::from(BLOCK));
+        self.reserve_sort(context, n)?;
         let n_boxes = |n: u64| levels(n as u32).last().map_or(1, |[first, n]| u64::from(first + n));
+        let (boxes, roomy) = (n_boxes(u64::from(n)), n_boxes(roomy(n)));
+        room(context, &mut self.boxes, boxes, roomy)?;
+        room(context, &mut self.nodes, boxes / 8 + 2, roomy / 8 + 2)
+    }
+
+    /// Makes room for a sort of `n` points.
+    pub(super) fn reserve_sort(&mut self, context: &Context, n: u32) -> Result<(), Error> {
+        let (n, roomy) = (u64::from(n), roomy(n));
+        let room = |array: &mut Array, needed: u64, roomy: u64| room(context, array, needed, roomy);
+        let n_blocks = |n: u64| n.div_ceil(u64::from(BLOCK));
         room(&mut self.blocks, n_blocks(n), n_blocks(roomy))?;
         room(&mut self.bounds, 1, 1)?;
         for i in 0..2 {
@@ -102,24 +115,51 @@ impl Index {
         }
         let digits = 1 << DIGIT_BITS;
         room(&mut self.counts, digits * n_blocks(n), digits * n_blocks(roomy))?;
-        room(&mut self.totals, digits, digits)?;
-        room(&mut self.boxes, n_boxes(n), n_boxes(roomy))?;
-        room(&mut self.nodes, n_boxes(n) / 8 + 2, n_boxes(roomy) / 8 + 2)
+        room(&mut self.totals, digits, digits)
     }
 
-    /// Records the sort of `n` photons into `sorted`, and the tree over them. Call [`Index::reserve`] first.
-    pub(super) fn build(&mut self, batch: &mut Batch<'_>, n: u32, photons: &Array, sorted: &Array) {
+    /// Records the sort of `n` records of some words each into `sorted`, and the tree over them. Call [`Index::reserve`]
+    /// first.
+    pub(super) fn build(
+        &mut self,
+        batch: &mut Batch<'_>,
+        n: u32,
+        records: &wgpu::BindingResource<'_>,
+        words: u32,
+        sorted: &Array,
+    ) {
         self.levels = levels(n);
         if n == 0 {
             return;
         }
+        self.sort(batch, n, records, words, sorted);
+
+        let tree = [sorted.all(), self.boxes.all(), self.nodes.all()];
+        let [_, n_leaves] = self.levels[0];
+        batch.dispatch(&self.tree_leaves, &tree, [n, n_leaves, self.words, 0], n_leaves.div_ceil(THREADS));
+        for pair in self.levels.windows(2) {
+            let ([below, n_below], [first, n]) = (pair[0], pair[1]);
+            let arguments = self.arguments([below, n_below, first, n]);
+            batch.dispatch(&self.tree_level, &tree, arguments, n.div_ceil(THREADS));
+        }
+    }
+
+    /// Records the sort alone, `n` > 0. Call [`Index::reserve_sort`] first.
+    pub(super) fn sort(
+        &self,
+        batch: &mut Batch<'_>,
+        n: u32,
+        records: &wgpu::BindingResource<'_>,
+        words: u32,
+        sorted: &Array,
+    ) {
         let n_blocks = n.div_ceil(BLOCK);
         let groups = n.div_ceil(THREADS);
-        let bounds = [photons.all(), self.blocks.all(), self.bounds.all()];
-        batch.dispatch(&self.bounds_of_blocks, &bounds, [n, WORDS, 0, 0], n_blocks);
+        let bounds = [records.clone(), self.blocks.all(), self.bounds.all()];
+        batch.dispatch(&self.bounds_of_blocks, &bounds, [n, words, 0, 0], n_blocks);
         batch.dispatch(&self.bounds_of_all, &bounds, [n, 0, 0, 0], 1);
-        let morton = [photons.all(), self.bounds.all(), self.keys[0].all(), self.order[0].all()];
-        batch.dispatch(&self.morton_keys, &morton, [n, WORDS, 0, 0], groups);
+        let morton = [records.clone(), self.bounds.all(), self.keys[0].all(), self.order[0].all()];
+        batch.dispatch(&self.morton_keys, &morton, [n, words, 0, 0], groups);
 
         for pass in 0..N_PASSES {
             let (from, to) = ((pass % 2) as usize, (1 - pass % 2) as usize);
@@ -137,15 +177,8 @@ impl Index {
             batch.dispatch(&self.sort_scatter, &buffers, arguments, n_blocks);
         }
         let last = (N_PASSES % 2) as usize;
-        batch.dispatch(&self.permute, &[self.order[last].all(), photons.all(), sorted.all()], [n, 0, 0, 0], groups);
-
-        let tree = [sorted.all(), self.boxes.all(), self.nodes.all()];
-        batch.dispatch(&self.tree_leaves, &tree, [n, self.levels[0][1], WORDS, 0], self.levels[0][1].div_ceil(THREADS));
-        for pair in self.levels.windows(2) {
-            let ([below, n_below], [first, n]) = (pair[0], pair[1]);
-            let arguments = self.arguments([below, n_below, first, n]);
-            batch.dispatch(&self.tree_level, &tree, arguments, n.div_ceil(THREADS));
-        }
+        let buffers = [self.order[last].all(), records.clone(), sorted.all()];
+        batch.dispatch(&self.permute, &buffers, [n, words, 0, 0], groups);
     }
 
     /// With the levels of the tree, which walks and builds of it read.
@@ -156,4 +189,13 @@ impl Index {
         }
         arguments
     }
+}
+
+/// A little more than asked, for the number changes from one build to the next.
+fn roomy(n: u32) -> u64 {
+    u64::from(n) + u64::from(n / 16)
+}
+
+fn room(context: &Context, array: &mut Array, needed: u64, roomy: u64) -> Result<(), Error> {
+    if array.capacity() >= needed.max(1) { Ok(()) } else { array.reserve(context, roomy.max(1)) }
 }

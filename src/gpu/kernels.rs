@@ -6,13 +6,13 @@ use std::sync::{Arc, Mutex};
 
 use bytemuck::{Pod, Zeroable};
 
-use super::context::Context;
+use super::context::{Context, Scopes};
 use super::shaders;
 use crate::device::Error;
 
 /// How a kernel uses a storage buffer.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Access {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
     /// Reads it.
     Read,
     /// Reads or writes it.
@@ -34,6 +34,7 @@ pub(super) struct Kernel {
 pub(super) struct Arguments {
     pub(super) values: [u32; 4],
     pub(super) levels: [[u32; 2]; 12],
+    pub(super) further: [u32; 4],
 }
 
 impl From<[u32; 4]> for Arguments {
@@ -98,6 +99,16 @@ pub(super) fn storage(access: Access) -> wgpu::BindingType {
     }
 }
 
+impl From<Access> for wgpu::BindingType {
+    fn from(access: Access) -> Self {
+        storage(access)
+    }
+}
+
+/// What ray queries search.
+pub(super) const ACCELERATION_STRUCTURE: wgpu::BindingType =
+    wgpu::BindingType::AccelerationStructure { vertex_return: false };
+
 /// What all kernels share. Bind group 0 is a kernel's own, 1 holds the arguments of the dispatch, those after it are the
 /// user's: a kernel sees them if its text names `@group(2)`, or `@group(3)`.
 pub(super) struct Shared {
@@ -122,8 +133,8 @@ impl Shared {
     }
 }
 
-/// The kernels of one device; each is made once.
-pub(super) type Cache = Mutex<HashMap<&'static str, Arc<Kernel>>>;
+/// The kernels of one device by module and entry point; each is made once.
+pub(super) type Cache = Mutex<HashMap<(&'static str, &'static str), Arc<Kernel>>>;
 
 /// Makes kernels.
 pub(super) struct Modules<'a> {
@@ -136,21 +147,42 @@ impl<'a> Modules<'a> {
         Self { context, shared }
     }
 
-    /// The entry point `name` of `module`, whose storage buffers are used as `accesses` says, in the order of their
-    /// bindings.
-    pub(super) fn kernel(&self, module: &str, name: &'static str, accesses: &[Access]) -> Result<Arc<Kernel>, Error> {
+    /// The entry point `name` of `module`; `bindings` are those of its group 0, storage buffers by their [`Access`].
+    pub(super) fn kernel(
+        &self,
+        module: &'static str,
+        name: &'static str,
+        bindings: &[impl Copy + Into<wgpu::BindingType>],
+    ) -> Result<Arc<Kernel>, Error> {
         let mut known = self.context.kernels.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        if let Some(kernel) = known.get(name) {
+        if let Some(kernel) = known.get(&(module, name)) {
             return Ok(Arc::clone(kernel));
         }
-        let kernel = Arc::new(self.build(module, name, accesses)?);
-        known.insert(name, Arc::clone(&kernel));
+        let built = self.build(module, shaders::source(module), name, bindings, false);
+        let kernel = Arc::new(built.map_err(|error| self.context.error(format!("{module}.wgsl: {error}")))?);
+        known.insert((module, name), Arc::clone(&kernel));
         Ok(kernel)
     }
 
-    fn build(&self, module: &str, name: &'static str, accesses: &[Access]) -> Result<Kernel, Error> {
+    /// The entry point `name` of a text from outside this crate; what is wrong with it is an error that names the line.
+    pub(super) fn custom(
+        &self,
+        source: String,
+        name: &'static str,
+        bindings: &[impl Copy + Into<wgpu::BindingType>],
+    ) -> Result<Kernel, Error> {
+        self.build("custom", source, name, bindings, true).map_err(|error| Error::Shader(error.to_string()))
+    }
+
+    fn build(
+        &self,
+        module: &str,
+        source: String,
+        name: &'static str,
+        bindings: &[impl Copy + Into<wgpu::BindingType>],
+        zero_workgroup_memory: bool,
+    ) -> Result<Kernel, wgpu::Error> {
         let device = &self.context.device;
-        let source = shaders::source(module);
         let n_groups = (1..4).rev().find(|n| source.contains(&format!("@group({n})"))).unwrap_or(0);
         let build = || {
             let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
@@ -158,11 +190,11 @@ impl<'a> Modules<'a> {
                 source: wgpu::ShaderSource::Wgsl(source.into()),
             });
             let entries: Vec<_> = (0..)
-                .zip(accesses)
-                .map(|(binding, &access)| wgpu::BindGroupLayoutEntry {
+                .zip(bindings)
+                .map(|(binding, &ty)| wgpu::BindGroupLayoutEntry {
                     binding,
                     visibility: wgpu::ShaderStages::COMPUTE,
-                    ty: storage(access),
+                    ty: ty.into(),
                     count: None,
                 })
                 .collect();
@@ -181,30 +213,33 @@ impl<'a> Modules<'a> {
                 module: &shader,
                 entry_point: Some(name),
                 compilation_options: wgpu::PipelineCompilationOptions {
-                    // Nothing here reads workgroup memory that it has not written.
-                    zero_initialize_workgroup_memory: false,
+                    // Nothing of this crate reads workgroup memory that it has not written.
+                    zero_initialize_workgroup_memory: zero_workgroup_memory,
                     ..Default::default()
                 },
                 cache: None,
             });
             Kernel { name, pipeline, bindings, n_groups }
         };
-        self.context.scoped(build).map_err(|error| self.context.error(format!("{module}.wgsl: {error}")))
+        self.context.scoped(build)
     }
 }
 
-/// Dispatches that are submitted together.
+/// Dispatches that are submitted together. What goes wrong while they are recorded is returned by [`Batch::submit`], and
+/// never reaches the handler of a device's owner; batches of one thread must end in reverse order of their beginning.
 pub(super) struct Batch<'a> {
     context: &'a Context,
     shared: &'a Shared,
+    scopes: Scopes,
     encoder: wgpu::CommandEncoder,
     arguments: Vec<u8>,
 }
 
 impl<'a> Batch<'a> {
     pub(super) fn new(context: &'a Context, shared: &'a Shared, label: &str) -> Self {
+        let scopes = Scopes::new(&context.device);
         let encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) });
-        Self { context, shared, encoder, arguments: Vec::new() }
+        Self { context, shared, scopes, encoder, arguments: Vec::new() }
     }
 
     /// For copies and timestamps.
@@ -259,6 +294,9 @@ impl<'a> Batch<'a> {
             self.context.queue.write_buffer(&self.shared.arguments, 0, &self.arguments);
         }
         self.context.queue.submit([self.encoder.finish()]);
+        if let Some(error) = self.scopes.first() {
+            return Err(self.context.error(error.to_string()));
+        }
         self.context.check()
     }
 }

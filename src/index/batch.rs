@@ -28,6 +28,14 @@ impl Radii<'_> {
         }
     }
 
+    /// Those of some of the queries.
+    pub fn part(&self, queries: std::ops::Range<usize>) -> Self {
+        match self {
+            Self::One(radius) => Self::One(*radius),
+            Self::Each(radii) => Self::Each(&radii[queries]),
+        }
+    }
+
     /// Refuses queries and radii that an index built for `built` cannot answer.
     pub fn check(&self, queries: &[Vec3], built: f32) -> Result<(), Error> {
         let check = |query: usize, radius: f32| {

@@ -82,17 +82,18 @@ impl Blocks {
     }
 }
 
-/// No coordinate of a point within a radius of this square is further from the query's, all roundings included: of the
-/// difference, its square (which may vanish) and the radius's square.
+/// No coordinate of a point within a radius of this square is further from the query's, roundings included: that of the
+/// square of their difference, which may vanish, and that of the difference.
 #[inline]
 pub(super) fn reach(radius2: f32) -> f32 {
-    radius2.next_up().sqrt().next_up().next_up()
+    radius2.next_up().sqrt().next_up()
 }
 
-/// Least and largest corner of a box outside of which no point is within the reach of `centre`.
+/// Least and largest corner of a box outside of which no point is within the reach of `centre`. (Rounding is monotonic,
+/// and coordinates are numbers already rounded: none comes to lie outside.)
 #[inline]
 pub(super) fn around(centre: Vec3, reach: f32) -> (Vec3, Vec3) {
-    ((centre - reach).map(f32::next_down), (centre + reach).map(f32::next_up))
+    (centre - reach, centre + reach)
 }
 
 /// The box that is neutral in a union.

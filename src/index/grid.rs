@@ -10,7 +10,7 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::batch::{GRAIN, fold_each};
+use super::batch::fold_each;
 use super::blocks::{Blocks, Splat, bounds, reach, splat};
 use super::stats::{CountVisits, Tally, Visits};
 use super::{Error, Nearest, Radii, RadiusSearch, check_points, check_radius, radius2};
@@ -29,8 +29,10 @@ const LONGEST: f32 = 1e37;
 const MAX_BRICKS: usize = 1 << 23;
 /// Fewer queries are not worth sorting.
 const FEW: usize = 4096;
+/// Queries that are sorted together, by one thread: at most.
+const MANY: usize = 1 << 18;
 
-/// Whether a batch is sorted by cell before it is answered.
+/// Whether a batch is sorted, by bricks of cells, before it is answered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum QueryOrder {
     /// Sorted where neighbours in the slice are not neighbours in space.
@@ -183,7 +185,7 @@ impl HashGrid {
     /// First and last cell within the reach along an axis.
     #[inline]
     fn window(&self, x: f32, reach: f32, axis: usize) -> Option<(u32, u32)> {
-        let (from, to) = ((x - reach).next_down().max(f32::MIN), (x + reach).next_up().min(f32::MAX));
+        let (from, to) = ((x - reach).max(f32::MIN), (x + reach).min(f32::MAX));
         let to_cell = to * self.scale - self.base[axis];
         let (from, to) = (self.cell(from, axis), (to_cell as u32).min(self.last[axis]));
         (to_cell >= 0.0 && from <= to).then(|| {
@@ -267,25 +269,18 @@ impl RadiusSearch for HashGrid {
             return fold_each(self, queries, radii, start, visit);
         }
         radii.check(queries, self.max_radius())?;
-        let mut slots = Vec::new();
-        queries.par_iter().with_min_len(8192).map(|&q| self.slot(q) as u32).collect_into_vec(&mut slots);
-        let (mut starts, mut order) = (Vec::new(), Vec::new());
-        counting_sort(&slots, self.starts.len() - 1, &mut starts, &mut order);
-        let fold = |&query: &u32| {
-            let mut state = start(query as usize);
-            self.within(queries[query as usize], radii.of(query as usize), |i, d2| visit(&mut state, i, d2));
-            state
-        };
-        let mut folded: Vec<T> = order.par_iter().with_min_len(GRAIN).map(fold).collect();
-        // Back to the order of the queries: each exchange puts one where it belongs.
-        for at in 0..order.len() {
-            while order[at] as usize != at {
-                let home = order[at] as usize;
-                folded.swap(at, home);
-                order.swap(at, home);
+        let mut states: Vec<T> = (0..queries.len()).into_par_iter().with_min_len(FEW).map(&start).collect();
+        let size = queries.len().div_ceil(2 * rayon::current_num_threads()).clamp(FEW, MANY);
+        states.par_chunks_mut(size).zip(queries.par_chunks(size)).enumerate().for_each(|(block, (states, queries))| {
+            let bricks: Vec<u32> = queries.iter().map(|&q| (self.slot(q) / BRICK) as u32).collect();
+            let (mut starts, mut order) = (Vec::new(), Vec::new());
+            counting_sort(&bricks, self.starts.len() / BRICK, &mut starts, &mut order);
+            for query in order.into_iter().map(|query| query as usize) {
+                let radius = radii.of(block * size + query);
+                self.within(queries[query], radius, |i, d2| visit(&mut states[query], i, d2));
             }
-        }
-        Ok(folded)
+        });
+        Ok(states)
     }
 }
 

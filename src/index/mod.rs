@@ -10,11 +10,14 @@ mod bvh;
 mod grid;
 mod kd;
 mod kd_buffered;
+mod lanes;
 mod nearest;
+mod packet;
 mod queries_as_boxes;
 mod sample_boxes;
 mod sample_build;
 pub mod stats;
+mod walk;
 
 use std::ops::ControlFlow;
 

@@ -3,24 +3,28 @@
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
 
 use glam::Vec3;
-use sunfleck::gpu::{Choice, Context, GpuStages};
+use sunfleck::gpu::{Choice, Context, GpuStages, Method};
+use sunfleck::index;
 use sunfleck::layout::{self, Camera, EyeVertex, FANOUT, Frame, LEAF_SIZE, Photon, PointBox};
 use sunfleck::math::{morton, oct, rng};
 use sunfleck::ppm::{Error, Stages, film};
 use sunfleck::scene::PackedScene;
 
-/// The device that all tests share; `None` without an adapter.
-pub fn context() -> Option<Arc<Context>> {
+pub use crate::gpu_search::context;
+
+/// A device with ray queries; `None` without an adapter that has them.
+pub fn context_with_ray_queries() -> Option<Arc<Context>> {
     static CONTEXT: OnceLock<Option<Arc<Context>>> = OnceLock::new();
-    let opened = CONTEXT.get_or_init(|| match Context::new(&Choice::Any) {
+    let opened = CONTEXT.get_or_init(|| match Context::with_ray_queries(&Choice::Any) {
         Ok(context) => Some(Arc::new(context)),
         Err(error) => {
-            assert!(std::env::var_os("SUNFLECK_REQUIRE_GPU").is_none(), "SUNFLECK_REQUIRE_GPU is set, but: {error}");
+            let required = std::env::var_os("SUNFLECK_REQUIRE_RAY_QUERY").is_some();
+            assert!(!required, "SUNFLECK_REQUIRE_RAY_QUERY is set, but: {error}");
             None
         }
     });
     if opened.is_none() {
-        println!("skipped: no GPU adapter");
+        println!("skipped: no GPU adapter with ray queries");
     }
     opened.clone()
 }
@@ -31,6 +35,17 @@ fn stages() -> Option<MutexGuard<'static, GpuStages>> {
     let context = context()?;
     let stages = STAGES.get_or_init(|| {
         Mutex::new(GpuStages::new(context, &PackedScene::default(), Camera::default()).expect("stages"))
+    });
+    Some(stages.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
+}
+
+/// One more that gathers by ray queries.
+fn hardware_stages() -> Option<MutexGuard<'static, GpuStages>> {
+    static STAGES: OnceLock<Mutex<GpuStages>> = OnceLock::new();
+    let context = context_with_ray_queries()?;
+    let stages = STAGES.get_or_init(|| {
+        let stages = GpuStages::with_method(context, &PackedScene::default(), Camera::default(), Method::Hardware);
+        Mutex::new(stages.expect("stages"))
     });
     Some(stages.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
 }
@@ -190,6 +205,16 @@ fn gather_frame(n: u32, flags: u32) -> Frame {
 #[test]
 fn gather_finds_what_brute_force_finds() {
     let Some(mut gpu) = stages() else { return };
+    assert_gathers(&mut gpu);
+}
+
+#[test]
+fn ray_queries_find_what_brute_force_finds() {
+    let Some(mut gpu) = hardware_stages() else { return };
+    assert_gathers(&mut gpu);
+}
+
+fn assert_gathers(gpu: &mut GpuStages) {
     for (name, photons) in photon_sets() {
         let n = 300;
         let vertices: Vec<_> = (0..n).map(|i| eye_vertex(&photons, i)).collect();
@@ -234,6 +259,36 @@ fn the_same_input_gives_the_same_bits() {
         gpu.radiance().expect("radiance").into_iter().flatten().map(f32::to_bits).collect::<Vec<_>>()
     };
     assert!(run() == run());
+}
+
+/// Boxes are as wide as the radius they were built for.
+#[test]
+fn ray_queries_refuse_radii_above_the_built_one() {
+    let Some(mut gpu) = hardware_stages() else { return };
+    let (_, photons) = photon_sets().swap_remove(2);
+    let frame = gather_frame(4, 0);
+    let vertices: Vec<_> = (0..4).map(|i| eye_vertex(&photons, i)).collect();
+    gpu.set_eye_vertices(&vertices).expect("vertices");
+    gpu.set_photons(&photons).expect("photons");
+    gpu.set_first_radii(&[0.1, 0.3, 0.2, 0.0]).expect("radii");
+    gpu.build_index(&frame).expect("build");
+    gpu.gather(&frame).expect("gather");
+    gpu.set_first_radii(&[0.1, 0.1, 0.4, 0.0]).expect("radii");
+    match gpu.gather(&frame) {
+        Err(Error::Search(index::Error::RadiusAboveBuilt { query: 2, radius, built })) => {
+            assert_eq!((radius, built), (0.4 * frame.radius_scale, 0.3 * frame.radius_scale));
+        }
+        other => panic!("{other:?}"),
+    }
+    gpu.build_index(&frame).expect("build");
+    gpu.gather(&frame).expect("gather");
+}
+
+#[test]
+fn ray_queries_need_a_device_opened_for_them() {
+    let Some(context) = context() else { return };
+    let refused = GpuStages::with_method(context, &PackedScene::default(), Camera::default(), Method::Hardware);
+    assert!(matches!(refused.err(), Some(Error::NoDevice(_))));
 }
 
 #[test]

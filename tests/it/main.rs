@@ -8,6 +8,8 @@ mod bench;
 mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
+#[cfg(feature = "gpu")]
+mod gpu_search;
 mod index;
 mod indices;
 mod layering;

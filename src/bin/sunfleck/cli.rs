@@ -174,6 +174,10 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N|NAME", help_heading = "Device")]
     pub device: Option<String>,
 
+    /// How the GPU finds photons; hardware: by ray queries, where the adapter has them (see --list-devices)
+    #[arg(long, value_parser = ["tree", "hardware"], default_value = "tree", help_heading = "Device")]
+    pub index: String,
+
     /// CPU threads [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Device")]
     pub threads: Option<u16>,

@@ -1,0 +1,144 @@
+//! Times every stage of an iteration over the shipped scenes, on the CPU and on a GPU.
+//!
+//! ```text
+//! cargo bench --bench iteration -- --scene glass --scene pool --size 512x512 --photons 100000,500000 --json out.json
+//! ```
+//!
+//! Backends take turns (A B A B) within a run; figures are medians over the iterations, the first ones not counted. With
+//! `--threads 1` seconds on the CPU are CPU seconds.
+
+use std::sync::Arc;
+
+use anyhow::{Context as _, Result, bail};
+use clap::Parser;
+use serde_json::{Value, json};
+use sunfleck::cpu::CpuStages;
+use sunfleck::ppm::{self, Params, StageTimes, Stages};
+use sunfleck::scene::{PackedScene, shipped};
+
+#[derive(Parser)]
+#[command(about = "Times every stage of an iteration")]
+struct Args {
+    /// Shipped scene; repeatable [default: all]
+    #[arg(long)]
+    scene: Vec<String>,
+    /// Pixels
+    #[arg(long, default_value = "512x512", value_name = "WxH")]
+    size: String,
+    /// Photon paths an iteration; several separated by commas
+    #[arg(long, default_value = "262144", value_delimiter = ',')]
+    photons: Vec<u32>,
+    /// `cpu`, `gpu` or both
+    #[arg(long, default_value = "cpu,gpu", value_delimiter = ',')]
+    backend: Vec<String>,
+    /// Iterations counted
+    #[arg(long, default_value_t = 10)]
+    iterations: u32,
+    /// Iterations not counted, first
+    #[arg(long, default_value_t = 2)]
+    warm_up: u32,
+    /// CPU threads [default: all]
+    #[arg(long, default_value_t = 0)]
+    threads: usize,
+    /// Write the figures there as JSON
+    #[arg(long)]
+    json: Option<std::path::PathBuf>,
+    /// What cargo adds
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+fn main() -> Result<()> {
+    let args = Args::parse();
+    rayon::ThreadPoolBuilder::new().num_threads(args.threads).build_global()?;
+    let (width, height) = args.size.split_once('x').context("--size is not WxH")?;
+    let size = [width.parse()?, height.parse()?];
+    let names: Vec<&str> = match args.scene.as_slice() {
+        [] => shipped::NAMES.to_vec(),
+        some => some.iter().map(String::as_str).collect(),
+    };
+    let mut rows = Vec::new();
+    println!("milliseconds, median (least – most) of {} iterations, {}x{}", args.iterations, size[0], size[1]);
+    for name in names {
+        let scene = shipped::shipped(name).with_context(|| format!("no scene {name}"))?;
+        let camera = scene.cameras.first().context("no camera")?.pack(size[0], size[1]);
+        let packed = Arc::new(PackedScene::new(&scene));
+        for &n_paths in &args.photons {
+            let params = Params { n_paths, ..Params::new(size[0], size[1]) };
+            let mut backends = Vec::new();
+            for backend in &args.backend {
+                let stages: Option<Box<dyn Stages>> = match backend.as_str() {
+                    "cpu" => Some(Box::new(CpuStages::new(packed.clone(), camera, size))),
+                    "gpu" => gpu(&packed, camera),
+                    other => bail!("no backend {other}"),
+                };
+                backends.extend(stages);
+            }
+            rows.extend(measure(&args, name, &params, backends)?);
+        }
+    }
+    if let Some(path) = &args.json {
+        std::fs::write(path, serde_json::to_string_pretty(&rows)?).with_context(|| path.display().to_string())?;
+    }
+    Ok(())
+}
+
+#[cfg(feature = "gpu")]
+fn gpu(packed: &PackedScene, camera: sunfleck::layout::Camera) -> Option<Box<dyn Stages>> {
+    use sunfleck::gpu::{Choice, Context, GpuStages};
+    let stages = Context::new(&Choice::Any).and_then(|c| GpuStages::new(Arc::new(c), packed, camera));
+    stages.map_err(|e| println!("no GPU: {e}")).ok().map(|s| Box::new(s) as Box<dyn Stages>)
+}
+
+#[cfg(not(feature = "gpu"))]
+fn gpu(_: &PackedScene, _: sunfleck::layout::Camera) -> Option<Box<dyn Stages>> {
+    println!("built without the GPU backend");
+    None
+}
+
+fn measure(args: &Args, scene: &str, params: &Params, mut backends: Vec<Box<dyn Stages>>) -> Result<Vec<Value>> {
+    let mut times: Vec<Vec<StageTimes>> = vec![Vec::new(); backends.len()];
+    for stages in &mut backends {
+        ppm::start(stages.as_mut(), params)?;
+    }
+    for i in 1..=args.warm_up + args.iterations {
+        for (stages, times) in backends.iter_mut().zip(&mut times) {
+            ppm::iterate(stages.as_mut(), &params.frame(i))?;
+            if i > args.warm_up {
+                times.push(stages.times()?);
+            }
+        }
+    }
+    let mut rows = Vec::new();
+    for (stages, times) in backends.iter().zip(&times) {
+        type Of = fn(&StageTimes) -> f64;
+        let stage_names: [(&str, Of); 6] = [
+            ("eye", |t| t.eye),
+            ("photons", |t| t.photons),
+            ("build", |t| t.build),
+            ("gather", |t| t.gather),
+            ("accumulate", |t| t.accumulate),
+            ("total", StageTimes::total),
+        ];
+        println!("{scene}, {} paths, {} photons stored, {}", params.n_paths, stages.n_photons(), stages.device());
+        let mut milliseconds = serde_json::Map::new();
+        for (stage, of) in stage_names {
+            let mut values: Vec<f64> = times.iter().map(|t| 1e3 * of(t)).collect();
+            values.sort_by(f64::total_cmp);
+            let median = values.get(values.len() / 2).copied().context("--iterations is 0")?;
+            let (least, most) = (values[0], values[values.len() - 1]);
+            println!("  {stage:<10} {median:9.2}  ({least:.2} – {most:.2})");
+            milliseconds.insert(stage.into(), json!({ "median": median, "least": least, "most": most }));
+        }
+        rows.push(json!({
+            "scene": scene,
+            "device": stages.device(),
+            "size": params.size,
+            "photonPaths": params.n_paths,
+            "photonsStored": stages.n_photons(),
+            "iterations": args.iterations,
+            "milliseconds": milliseconds,
+        }));
+    }
+    Ok(rows)
+}
