@@ -14,6 +14,7 @@ mod lanes;
 mod nearest;
 mod packet;
 mod queries_as_boxes;
+mod radix;
 mod sample_boxes;
 mod sample_build;
 pub mod stats;

@@ -12,23 +12,6 @@ use sunfleck::scene::PackedScene;
 
 pub use crate::gpu_search::context;
 
-/// A device with ray queries; `None` without an adapter that has them.
-pub fn context_with_ray_queries() -> Option<Arc<Context>> {
-    static CONTEXT: OnceLock<Option<Arc<Context>>> = OnceLock::new();
-    let opened = CONTEXT.get_or_init(|| match Context::with_ray_queries(&Choice::Any) {
-        Ok(context) => Some(Arc::new(context)),
-        Err(error) => {
-            let required = std::env::var_os("SUNFLECK_REQUIRE_RAY_QUERY").is_some();
-            assert!(!required, "SUNFLECK_REQUIRE_RAY_QUERY is set, but: {error}");
-            None
-        }
-    });
-    if opened.is_none() {
-        println!("skipped: no GPU adapter with ray queries");
-    }
-    opened.clone()
-}
-
 /// One set of buffers for the tests that need no scene.
 fn stages() -> Option<MutexGuard<'static, GpuStages>> {
     static STAGES: OnceLock<Mutex<GpuStages>> = OnceLock::new();
@@ -42,7 +25,7 @@ fn stages() -> Option<MutexGuard<'static, GpuStages>> {
 /// One more that gathers by ray queries.
 fn hardware_stages() -> Option<MutexGuard<'static, GpuStages>> {
     static STAGES: OnceLock<Mutex<GpuStages>> = OnceLock::new();
-    let context = context_with_ray_queries()?;
+    let context = crate::gpu_hardware::context()?;
     let stages = STAGES.get_or_init(|| {
         let stages = GpuStages::with_method(context, &PackedScene::default(), Camera::default(), Method::Hardware);
         Mutex::new(stages.expect("stages"))

@@ -9,6 +9,8 @@ mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
 #[cfg(feature = "gpu")]
+mod gpu_hardware;
+#[cfg(feature = "gpu")]
 mod gpu_search;
 mod index;
 mod indices;
@@ -19,6 +21,8 @@ mod layout;
 mod loading;
 #[cfg(feature = "render")]
 mod physics;
+#[cfg(feature = "render")]
+mod points;
 #[cfg(feature = "render")]
 mod reference;
 #[cfg(feature = "render")]
