@@ -229,6 +229,29 @@ fn one_case_only() {
     assert_eq!(distinct(&rows, "case"), HashSet::from(["nearest"]));
 }
 
+/// The CPU's search checks the GPU's: other totals are an error.
+#[cfg(feature = "gpu")]
+#[test]
+fn a_gpu_takes_part() {
+    if sunfleck::gpu::list_devices().is_empty() {
+        assert!(std::env::var_os("SUNFLECK_REQUIRE_GPU").is_none(), "no GPU adapter");
+        println!("skipped: no GPU adapter");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let args = "--rounds 1 --samples 2k --queries 500 --radii 0.1 --distribution uniform --backend gpu,cpu";
+    let (text, found) = rows(folder.path(), "search", args, &["figure3", "figure4"]);
+    let gpu: Vec<&Value> = found.iter().filter(|row| row["index"] == "gpu").collect();
+    assert_eq!(gpu.len(), 2);
+    for row in gpu {
+        assert!(number(row, "searchMs") > 0.0 && row["searchCpuMs"].is_null(), "{row}");
+    }
+    assert!(text.contains(&sunfleck::gpu::list_devices()[0].name));
+    let folder = tempfile::tempdir().unwrap();
+    let (_, found) = rows(folder.path(), "points", "--rounds 1 --points 1k --backend gpu", &["figure7"]);
+    assert_eq!(distinct(&found, "index"), HashSet::from(["gpu"]));
+}
+
 fn mean(values: impl Iterator<Item = f32> + Clone) -> f32 {
     values.clone().sum::<f32>() / values.count() as f32
 }

@@ -41,13 +41,14 @@ pub fn open(args: &RenderArgs, progress: &Progress) -> Result<Device> {
     }
 }
 
-/// `cpu`, or `gpu`: the best adapter there is.
+/// `cpu`, or the best adapter there is: `gpu`, or `gpu-hardware` for its ray queries.
 #[cfg(feature = "gpu")]
 pub fn open_backend(name: &str) -> Result<Device> {
-    if name == "cpu" {
-        return Ok(Device::Cpu);
-    }
-    Ok(Device::Gpu(Arc::new(Context::new(&Choice::Any)?), Method::Tree))
+    Ok(match name {
+        "cpu" => Device::Cpu,
+        "gpu-hardware" => Device::Gpu(Arc::new(Context::with_ray_queries(&Choice::Any)?), Method::Hardware),
+        _ => Device::Gpu(Arc::new(Context::new(&Choice::Any)?), Method::Tree),
+    })
 }
 
 /// `cpu`: there is no other.
@@ -119,6 +120,15 @@ impl Device {
             Self::Cpu => "tree".to_owned(),
             #[cfg(feature = "gpu")]
             Self::Gpu(_, method) => method.to_string(),
+        }
+    }
+
+    /// What the adapter is called, if this is one.
+    pub fn gpu_name(&self) -> Option<String> {
+        match self {
+            Self::Cpu => None,
+            #[cfg(feature = "gpu")]
+            Self::Gpu(context, _) => Some(context.info().to_string()),
         }
     }
 

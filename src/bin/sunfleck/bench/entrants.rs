@@ -177,7 +177,7 @@ impl Entrant for QueriesAsBoxes<'_> {
         Ok(())
     }
 
-    fn ask(&self, question: &Question<'_>) -> Result<Answer> {
+    fn ask(&mut self, question: &Question<'_>) -> Result<Answer> {
         let radii = Radii::One(question.radius);
         let lists = queries_as_boxes(self.points, question.queries, radii, Builder::Lbvh, 1)?;
         let inverse = 1.0 / (question.radius * question.radius);
@@ -204,7 +204,7 @@ impl Entrant for Buffered<'_> {
         Ok(())
     }
 
-    fn ask(&self, question: &Question<'_>) -> Result<Answer> {
+    fn ask(&mut self, question: &Question<'_>) -> Result<Answer> {
         let Some(tree) = &self.tree else { bail!("{RIVAL} was asked before it was built") };
         if question.operation != Operation::Store {
             return contest::answer(tree, question);

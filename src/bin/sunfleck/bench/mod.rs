@@ -7,9 +7,10 @@
 //! machines and two programs are apart, not which method is better.
 //!
 //! Every figure is the median of several rounds after one that does not count, in which the indices take turns (A B A B);
-//! least and most are written beside it, CPU seconds beside those of the wall clock. Every timed answer is compared with
+//! least and most are written beside it, CPU seconds beside those of the wall clock; a GPU's times are its own timestamps. Every timed answer is compared with
 //! the right number of neighbours, which another index and, for some queries, brute force have counted before.
 
+mod backends;
 mod contest;
 mod entrants;
 mod gathers;
@@ -65,6 +66,14 @@ enum Benchmark {
     Photons(photons::PhotonsArgs),
     /// The library's indices and build options side by side
     Indices(indices::IndicesArgs),
+}
+
+/// Of the benchmarks that search on several devices.
+#[derive(Debug, Args)]
+struct Where {
+    /// Where to search, side by side [default: cpu, and gpu where a real one is]
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', value_parser = backends::NAMES)]
+    backend: Vec<String>,
 }
 
 /// What all benchmarks understand.

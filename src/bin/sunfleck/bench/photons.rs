@@ -29,7 +29,7 @@ use super::gathers::{self, Gathered};
 use super::measure::{Time, Times, timed};
 use super::plot::{self, Bars};
 use super::report::{self, Machine, Report, Row};
-use super::{Common, Steps, paper, short};
+use super::{Common, Steps, Where, backends, paper, short};
 use crate::cli::Usage;
 use crate::devices::{self, Device};
 use crate::job::{Input, use_paper_mode};
@@ -62,9 +62,8 @@ pub struct PhotonsArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     iterations: Option<u32>,
 
-    /// Backends, which take turns [default: cpu, and gpu where a real one is]
-    #[arg(long, value_name = "NAME,…", value_delimiter = ',', value_parser = ["cpu", "gpu"])]
-    backend: Vec<String>,
+    #[command(flatten)]
+    place: Where,
 
     /// Only the renderer's own gather
     #[arg(long)]
@@ -97,7 +96,7 @@ impl Method {
 struct Cell {
     scene: String,
     paths: u32,
-    backend: &'static str,
+    backend: String,
     device: String,
     method: Method,
     /// Mean.
@@ -111,10 +110,21 @@ struct Cell {
 }
 
 impl Cell {
-    fn new(scene: &str, paths: u32, backend: &'static str, device: String, method: Method) -> Self {
+    fn new(scene: &str, paths: u32, backend: &str, device: String, method: Method) -> Self {
         let others = (method == Method::InPlace).then(Default::default);
         let (build, gather) = Default::default();
-        Self { scene: scene.to_owned(), paths, backend, device, method, stored: 0.0, most: None, build, gather, others }
+        Self {
+            scene: scene.to_owned(),
+            paths,
+            backend: backend.to_owned(),
+            device,
+            method,
+            stored: 0.0,
+            most: None,
+            build,
+            gather,
+            others,
+        }
     }
 
     fn name(&self) -> String {
@@ -132,7 +142,7 @@ impl Cell {
             .with("scene", self.scene.as_str())
             .with("photonPaths", self.paths)
             .with("photonsStored", self.stored)
-            .with("backend", self.backend)
+            .with("backend", self.backend.as_str())
             .with("device", self.device.as_str())
             .with("method", self.method.name())
             .with("iterations", iterations)
@@ -161,7 +171,6 @@ impl Plan {
             [] => default.iter().map(|s| (*s).to_owned()).collect(),
             some => some.to_vec(),
         };
-        let backends: &[&str] = if devices::has_real_gpu() { &["cpu", "gpu"] } else { &["cpu"] };
         Self {
             scenes: or(&args.scene, &paper::TABLE_1.map(|row| row.0)),
             paths: match (args.photons.as_slice(), quick) {
@@ -171,7 +180,7 @@ impl Plan {
             },
             size: args.resolution.unwrap_or(if quick { [480, 270] } else { [1920, 1080] }),
             iterations: args.iterations.unwrap_or(if quick { 5 } else { 50 }),
-            backends: or(&args.backend, backends),
+            backends: backends::names(&args.place.backend),
         }
     }
 }
@@ -180,8 +189,8 @@ pub fn run(args: &PhotonsArgs) -> Result<()> {
     let common = &args.common;
     let plan = Plan::new(args);
     let twice = |list: &[String]| list.iter().enumerate().any(|(i, a)| list[..i].contains(a));
-    if twice(&plan.backends) || twice(&plan.scenes) {
-        bail!(Usage("a backend or a scene is named twice".into()));
+    if twice(&plan.scenes) {
+        bail!(Usage("a scene is named twice".into()));
     }
     let figure = [common.figure("figure9")];
     common.prepare("photons", &figure)?;
@@ -243,14 +252,14 @@ fn measure(
     let input = Input { scene, camera, params, warnings: vec![] };
     let packed = PackedScene::new(&input.scene);
     let mut runners = Vec::new();
-    for device in devices {
+    for (device, backend) in devices.iter().zip(&plan.backends) {
         let mut stages = device.stages(&input)?;
         let first_radii = render::start(stages.as_mut(), &input.params, !args.normal_mode)?;
-        let methods: &[Method] = match device.backend() == "cpu" && !args.in_place_only {
+        let methods: &[Method] = match backend == "cpu" && !args.in_place_only {
             true => &[Method::InPlace, Method::Boxes, Method::KdBuffered],
             false => &[Method::InPlace],
         };
-        let cell = |&method: &Method| Cell::new(name, paths, device.backend(), stages.device(), method);
+        let cell = |&method: &Method| Cell::new(name, paths, backend, stages.device(), method);
         let cells = methods.iter().map(cell).collect();
         runners.push(Runner { stages, cells, first_radii });
     }

@@ -18,11 +18,12 @@ use serde_json::json;
 use sunfleck::math::clouds;
 use sunfleck::points::generate::{Shape, scan};
 
+use super::backends::{self, Backends};
 use super::contest::{self, Operation, Question, Score};
 use super::entrants::{self, KD, METHOD};
 use super::plot::{self, Bars};
 use super::report::{self, Machine, Report, Row};
-use super::{Common, Rounds, count, paper, short};
+use super::{Common, Rounds, Where, count, paper, short};
 
 const NOTES: &[&str] = &[
     "operation: the k nearest within the radius, k = 1: one half of the cloud in the other, k = 4 and 8: all in all",
@@ -41,6 +42,9 @@ pub struct PointsArgs {
 
     #[command(flatten)]
     rounds: Rounds,
+
+    #[command(flatten)]
+    place: Where,
 
     /// Sizes of the clouds [default: the paper's, 100k,350k,500k,1M]
     #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = count)]
@@ -88,6 +92,8 @@ pub fn run(args: &PointsArgs) -> Result<()> {
     };
     let figure = [common.figure("figure7")];
     common.prepare("points", &figure)?;
+    let names = backends::names(&args.place.backend);
+    let places = Backends::open(&names)?;
     let mut steps = common.steps(sizes.len() * TASKS.len());
     let mut cells = Vec::new();
     for &n in &sizes {
@@ -100,7 +106,7 @@ pub fn run(args: &PointsArgs) -> Result<()> {
             let (queries, samples) = if k == 1 { mixed.split_at(n / 2) } else { (&all[..], &all[..]) };
             let radius = contest::radius_for(samples, queries, k as f64)?;
             let question = Question::new(samples, queries, radius, Operation::Nearest(k))?;
-            let mut entrants = entrants::nearest(samples);
+            let mut entrants = places.entrants(samples, entrants::nearest)?;
             let scores = contest::run(&mut entrants, radius, std::slice::from_ref(&question), args.rounds.rounds)?;
             cells.extend(entrants.iter().zip(scores).map(|(entrant, score)| Cell {
                 points: n,
@@ -116,9 +122,9 @@ pub fn run(args: &PointsArgs) -> Result<()> {
     }
     let report = Report {
         name: "points",
-        machine: Machine::here(vec![]),
+        machine: Machine::here(places.devices()),
         settings: json!({
-            "quick": common.quick, "rounds": args.rounds.rounds, "seed": common.seed, "points": sizes, "noise": NOISE,
+            "quick": common.quick, "rounds": args.rounds.rounds, "seed": common.seed, "backends": names, "points": sizes, "noise": NOISE,
         }),
         notes: NOTES,
         rows: cells.iter().map(Cell::row).collect(),

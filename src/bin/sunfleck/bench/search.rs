@@ -21,11 +21,12 @@ use glam::Vec3;
 use serde_json::json;
 use sunfleck::math::clouds;
 
+use super::backends::{self, Backends};
 use super::contest::{self, Operation, Question, Score};
 use super::entrants::{self, DEFAULT, METHOD, RIVAL};
 use super::plot::{self, Curves, Map, Series};
 use super::report::{self, Machine, Report, Row};
-use super::{Common, Rounds, count, length, paper, short};
+use super::{Common, Rounds, Where, count, length, paper, short};
 
 const NOTES: &[&str] = &[
     "operation: all neighbours of every query are stored with their squared distances",
@@ -40,6 +41,9 @@ pub struct SearchArgs {
 
     #[command(flatten)]
     rounds: Rounds,
+
+    #[command(flatten)]
+    place: Where,
 
     /// Numbers of samples, instead of the paper's low and high density
     #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = count)]
@@ -232,6 +236,8 @@ pub fn run(args: &SearchArgs) -> Result<()> {
     let plan = Plan::new(args);
     let figures = plan.figures(common);
     common.prepare("search", &figures)?;
+    let names = backends::names(&args.place.backend);
+    let places = Backends::open(&names)?;
     let mut steps = common.steps(plan.steps());
     let mut cells = Vec::new();
     for &distribution in &plan.distributions {
@@ -243,7 +249,7 @@ pub fn run(args: &SearchArgs) -> Result<()> {
                     .iter()
                     .map(|&n| Question::new(samples, &queries[..n], radius, Operation::Store))
                     .collect::<Result<Vec<_>>>()?;
-                let mut entrants = entrants::radius_search(samples);
+                let mut entrants = places.entrants(samples, entrants::radius_search)?;
                 let scores = contest::run(&mut entrants, radius, &questions, args.rounds.rounds)?;
                 for (entrant, score) in entrants.iter().zip(scores) {
                     cells.extend(questions.iter().zip(score.search).map(|(question, search)| Cell {
@@ -280,11 +286,12 @@ pub fn run(args: &SearchArgs) -> Result<()> {
     }
     let report = Report {
         name: "search",
-        machine: Machine::here(vec![]),
+        machine: Machine::here(places.devices()),
         settings: json!({
             "quick": common.quick,
             "rounds": args.rounds.rounds,
             "seed": common.seed,
+            "backends": names,
             "distributions": plan.distributions.iter().map(|d| d.name()).collect::<Vec<_>>(),
         }),
         notes: NOTES,
@@ -313,7 +320,8 @@ fn draw_maps(path: &std::path::Path, distribution: Distribution, plan: &Plan, ce
     let [figure, _] = distribution.figures();
     let mut panels = Vec::new();
     let columns = plan.densities.iter().map(|d| d.radii.len()).max().unwrap_or(1);
-    for index in [METHOD, DEFAULT] {
+    let taking_part = |index: &&str| cells.iter().any(|c| c.index == *index);
+    for index in [METHOD, DEFAULT, "gpu-hardware", "gpu"].into_iter().filter(taking_part) {
         for density in &plan.densities {
             let of =
                 |samples, queries, radius, index| find(cells, figure, index, density.name, (samples, queries, radius));
