@@ -100,10 +100,13 @@ def build(wanted, portable):
     # Also the generator of the points: without it there is nothing to do.
     subprocess.run(["cargo", "build", "--release", *manifest], env=env, check=True)
     metadata = subprocess.run(["cargo", "metadata", "--format-version=1", *manifest], check=True, capture_output=True)
+    head = subprocess.run(["git", "-C", str(HERE), "rev-parse", "--short", "HEAD"], capture_output=True, text=True)
     crates = {package["name"]: package["version"] for package in json.loads(metadata.stdout)["packages"]}
     for library in RUST:
         programs[library] = [str(rust_out / "release" / "sunfleck-peers"), "run", library]
         versions[library] = crates[library.split("-")[0]]
+        if library.startswith("sunfleck") and head.returncode == 0:
+            versions[library] += f" ({head.stdout.strip()})"
     arch = "ARCH=" if portable else "ARCH=-march=native"
     for library in [c for c in CPP if c in wanted]:
         program = cpp_out / library
