@@ -5,7 +5,7 @@
 use std::time::Instant;
 
 use glam::{Vec2, Vec3};
-use sunfleck::index::{PointBvh, Radii, RadiusSearch, distance2};
+use sunfleck::index::{HashGrid, PointBvh, Radii, RadiusSearch};
 use sunfleck::math::{rng, warp};
 
 const HELP: &str = "\
@@ -58,27 +58,14 @@ fn run(o: &Options) {
     println!("| what | median | least | most | checksum |\n|---|---|---|---|---|");
 
     let mut tree = PointBvh::new(&points).unwrap();
-    let grid = Grid::new(&points, radius);
-    // What takes turns with what.
-    let mut jobs: Vec<(String, f64, Box<dyn FnMut() -> f64 + '_>)> = Vec::new();
-    for (name, queries) in [("camera order", &camera), ("shuffled", &shuffled)] {
-        let n = queries.len() as f64;
-        let grid = &grid;
-        jobs.push((format!("grid, sorted queries, {name}"), n, Box::new(move || grid.sum_sorted(queries, radius))));
-        jobs.push((format!("grid, {name}"), n, Box::new(move || grid.sum(queries, radius))));
-    }
-    let t = &tree;
+    let grid = HashGrid::new(&points, radius).unwrap();
+    let mut jobs: Vec<Job<'_>> = Vec::new();
+    let (t, g) = (&tree, &grid);
     for (name, queries) in [("camera order", &camera), ("shuffled", &shuffled)] {
         let n = queries.len() as f64;
         let inverse = 1.0 / (radius * radius);
-        jobs.push((
-            format!("tree, batch, {name}"),
-            n,
-            Box::new(move || {
-                let sums = t.fold_all(queries, Radii::One(radius), |_| 0.0f32, |sum, _, d2| *sum += 1.0 - d2 * inverse);
-                sums.unwrap().iter().map(|&s| f64::from(s)).sum()
-            }),
-        ));
+        jobs.push((format!("tree, batch, {name}"), n, Box::new(move || kernel_sum(t, queries, radius))));
+        jobs.push((format!("grid, batch, {name}"), n, Box::new(move || kernel_sum(g, queries, radius))));
         jobs.push((
             format!("tree, one by one, {name}"),
             n,
@@ -105,7 +92,7 @@ fn run(o: &Options) {
     let queries: Vec<Vec3> = (0..32_768).map(|i| uniform(i, 8)).collect();
     let tree = &PointBvh::new(&points).unwrap();
     let (queries, n) = (&queries, queries.len() as f64);
-    let mut jobs: Vec<(String, f64, Box<dyn FnMut() -> f64 + '_>)> = Vec::new();
+    let mut jobs: Vec<Job<'_>> = Vec::new();
     for k in [1, 4, 8] {
         jobs.push((
             format!("k-NN, k = {k}"),
@@ -129,8 +116,17 @@ fn run(o: &Options) {
     measure(o, jobs);
 }
 
+/// Name, number of queries, and what is measured; it returns a checksum.
 type Job<'a> = (String, f64, Box<dyn FnMut() -> f64 + 'a>);
 
+/// The Epanechnikov kernel over the neighbours of each query, nothing stored; summed over the queries.
+fn kernel_sum(index: &impl RadiusSearch, queries: &[Vec3], radius: f32) -> f64 {
+    let inverse = 1.0 / (radius * radius);
+    let sums = index.fold_all(queries, Radii::One(radius), |_| 0.0f32, |sum, _, d2| *sum += 1.0 - d2 * inverse);
+    sums.unwrap().iter().map(|&sum| f64::from(sum)).sum()
+}
+
+/// Rounds in which the jobs take turns, after one that does not count.
 fn measure(o: &Options, mut jobs: Vec<Job<'_>>) {
     jobs.retain(|(name, ..)| name.contains(&o.only));
     let mut times = vec![Vec::new(); jobs.len()];
@@ -202,85 +198,4 @@ fn eye_vertex(i: u32, [w, h]: [u32; 2]) -> Vec3 {
     let wall = ((d.signum() - eye) / d).min_element();
     let t = if b * b > c { b - (b * b - c).sqrt() } else { wall };
     eye + d * t
-}
-
-/// A counting-sort grid with cells as wide as the radius: what the tree is held against.
-struct Grid {
-    min: Vec3,
-    inverse: f32,
-    cells: [usize; 3],
-    first: Vec<u32>,
-    points: Vec<Vec3>,
-}
-
-impl Grid {
-    fn new(points: &[Vec3], radius: f32) -> Self {
-        let (min, max) = points.iter().fold((points[0], points[0]), |(a, b), &p| (a.min(p), b.max(p)));
-        let inverse = 1.0 / radius;
-        let cells = ((max - min) * inverse).to_array().map(|n| n as usize + 1);
-        let mut grid = Self { min, inverse, cells, first: Vec::new(), points: Vec::new() };
-        let (order, first) = grid.order(points);
-        grid.first = first;
-        grid.points = order.iter().map(|&i| points[i as usize]).collect();
-        grid
-    }
-
-    fn cell(&self, p: Vec3) -> [usize; 3] {
-        let at = ((p - self.min) * self.inverse).max(Vec3::ZERO).to_array();
-        std::array::from_fn(|axis| (at[axis] as usize).min(self.cells[axis] - 1))
-    }
-
-    fn order(&self, points: &[Vec3]) -> (Vec<u32>, Vec<u32>) {
-        let key = |&p: &Vec3| {
-            let [x, y, z] = self.cell(p);
-            ((z * self.cells[1] + y) * self.cells[0] + x) as u32
-        };
-        let keys: Vec<u32> = points.iter().map(key).collect();
-        let mut first = vec![0u32; self.cells.iter().product::<usize>() + 1];
-        for &k in &keys {
-            first[k as usize + 1] += 1;
-        }
-        for i in 1..first.len() {
-            first[i] += first[i - 1];
-        }
-        let mut at = first.clone();
-        let mut order = vec![0; points.len()];
-        for (i, &k) in keys.iter().enumerate() {
-            order[at[k as usize] as usize] = i as u32;
-            at[k as usize] += 1;
-        }
-        (order, first)
-    }
-
-    fn one(&self, q: Vec3, radius2: f32, inverse: f32) -> f32 {
-        let [x, y, z] = self.cell(q);
-        let (x0, x1) = (x.saturating_sub(1), (x + 1).min(self.cells[0] - 1));
-        let mut sum = 0.0;
-        for z in z.saturating_sub(1)..=(z + 1).min(self.cells[2] - 1) {
-            for y in y.saturating_sub(1)..=(y + 1).min(self.cells[1] - 1) {
-                let row = (z * self.cells[1] + y) * self.cells[0];
-                let range = self.first[row + x0] as usize..self.first[row + x1 + 1] as usize;
-                for &p in &self.points[range] {
-                    let d2 = distance2(p, q);
-                    sum += if d2 <= radius2 { 1.0 - d2 * inverse } else { 0.0 };
-                }
-            }
-        }
-        sum
-    }
-
-    fn sum(&self, queries: &[Vec3], radius: f32) -> f64 {
-        let (radius2, inverse) = (radius * radius, 1.0 / (radius * radius));
-        let sums: Vec<f32> = queries.iter().map(|&q| self.one(q, radius2, inverse)).collect();
-        sums.iter().map(|&s| f64::from(s)).sum()
-    }
-
-    fn sum_sorted(&self, queries: &[Vec3], radius: f32) -> f64 {
-        let (radius2, inverse) = (radius * radius, 1.0 / (radius * radius));
-        let mut sums = vec![0.0; queries.len()];
-        for &i in &self.order(queries).0 {
-            sums[i as usize] = self.one(queries[i as usize], radius2, inverse);
-        }
-        sums.iter().map(|&s| f64::from(s)).sum()
-    }
 }

@@ -3,6 +3,7 @@
 use std::f32::consts::PI;
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 use super::bsdf::{Bsdf, Lobes, Transport};
 use crate::index::PointBvh;
@@ -15,22 +16,71 @@ pub const MIN_NORMAL_COSINE: f32 = 0.9;
 /// Photons further off the tangent plane, as a share of the radius, are on another one.
 pub const MAX_PLANE_OFFSET: f32 = 0.1;
 
-/// Radiance towards the eye: what the eye path found, and the photons within `radius` metres. `photons` are in the
-/// order of the tree.
+/// Side of the square of pixels whose vertices are searched around together.
+const TILE: usize = 8;
+/// Pixels one task takes, unless a row has more.
+const BAND: usize = 4096;
+
+/// Radiance towards the eye of each pixel of a film `width` wide: what the eye path found, and the photons within
+/// `first_radii · frame.radius_scale` metres. `photons` are in the order of the tree.
 pub fn gather(
     scene: &PackedScene,
     tree: &PointBvh,
     photons: &[Photon],
     frame: &Frame,
-    vertex: &EyeVertex,
-    radius: f32,
-) -> Vec3 {
-    if vertex.flags & EYE_GATHER == 0 {
-        return Vec3::from(vertex.radiance);
+    width: usize,
+    vertices: &[EyeVertex],
+    first_radii: &[f32],
+    radiance: &mut [[f32; 3]],
+) {
+    let rows = (BAND / width.max(1)).clamp(1, TILE);
+    let band = (rows * width).max(1);
+    let bands = radiance.par_chunks_mut(band).zip(vertices.par_chunks(band)).zip(first_radii.par_chunks(band));
+    bands.for_each(|((radiance, vertices), first_radii)| {
+        for (out, vertex) in radiance.iter_mut().zip(vertices) {
+            *out = vertex.radiance;
+        }
+        let pixels = in_tiles(width, vertices);
+        let radius = |pixel: usize| first_radii[pixel] * frame.radius_scale;
+        // Of each pixel so far: its photons may come in several parts.
+        let mut sums = vec![Sums::default(); pixels.len()];
+        tree.visit_packets(
+            pixels.len(),
+            |i| {
+                let pixel = pixels[i] as usize;
+                (Vec3::from(vertices[pixel].position), radius(pixel))
+            },
+            |i, slots, distances2| {
+                let pixel = pixels[i] as usize;
+                let mut estimate = Estimate::new(scene, frame, &vertices[pixel], radius(pixel));
+                estimate.sums = sums[i];
+                for (&slot, &distance2) in slots.iter().zip(distances2) {
+                    estimate.add(&photons[slot as usize], distance2);
+                }
+                sums[i] = estimate.sums;
+                radiance[pixel] = estimate.radiance().to_array();
+            },
+        );
+    });
+}
+
+/// The pixels of a band that gather, tile by tile.
+fn in_tiles(width: usize, vertices: &[EyeVertex]) -> Vec<u32> {
+    let mut pixels = Vec::with_capacity(vertices.len());
+    for left in (0..width).step_by(TILE) {
+        for row in (0..vertices.len()).step_by(width) {
+            let tile = row + left..row + (left + TILE).min(width);
+            pixels.extend(tile.filter(|&pixel| vertices[pixel].flags & EYE_GATHER != 0).map(|pixel| pixel as u32));
+        }
     }
-    let mut estimate = Estimate::new(scene, frame, vertex, radius);
-    tree.visit(estimate.centre, radius, |slot, distance2| estimate.add(&photons[slot as usize], distance2));
-    estimate.radiance()
+    pixels
+}
+
+/// What the photons about a vertex add up to.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    diffuse: Vec3,
+    glossy: Vec3,
 }
 
 /// The estimate at one eye vertex that gathers, whatever finds the photons for it.
@@ -46,8 +96,7 @@ pub struct Estimate<'a> {
     glossy: Option<(Bsdf<'a>, Vec3)>,
     both_sides: bool,
     constant: bool,
-    diffuse_sum: Vec3,
-    glossy_sum: Vec3,
+    sums: Sums,
 }
 
 impl<'a> Estimate<'a> {
@@ -68,8 +117,7 @@ impl<'a> Estimate<'a> {
             both_sides: glossy.is_some() && vertex.transmission > 0.0,
             glossy,
             constant: frame.flags & FRAME_CONSTANT_KERNEL != 0,
-            diffuse_sum: Vec3::ZERO,
-            glossy_sum: Vec3::ZERO,
+            sums: Sums::default(),
         }
     }
 
@@ -94,19 +142,19 @@ impl<'a> Estimate<'a> {
         let power = Vec3::from(photon.power) * weight;
         let incoming = oct::decode_unscaled(photon.direction);
         if incoming.dot(self.shading_normal) > 0.0 {
-            self.diffuse_sum += power;
+            self.sums.diffuse += power;
         }
         if let Some((bsdf, outgoing)) = &self.glossy {
             let lobes = Lobes { diffuse: false, specular: true };
-            self.glossy_sum += power * bsdf.evaluate(*outgoing, incoming.normalize(), lobes, Transport::Radiance);
+            self.sums.glossy += power * bsdf.evaluate(*outgoing, incoming.normalize(), lobes, Transport::Radiance);
         }
     }
 
-    /// What [`gather`] returns.
+    /// Radiance towards the eye, what its path found included.
     #[inline]
     pub fn radiance(&self) -> Vec3 {
         let vertex = self.vertex;
-        let sum = self.diffuse_sum * Vec3::from(vertex.diffuse) + self.glossy_sum;
+        let sum = self.sums.diffuse * Vec3::from(vertex.diffuse) + self.sums.glossy;
         let scale = self.inverse_radius2 / (PI * self.frame.n_paths as f32);
         Vec3::from(vertex.radiance) + Vec3::from(vertex.throughput) * sum * scale
     }

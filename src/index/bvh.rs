@@ -11,10 +11,12 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::lanes::{Eight, WIDTH};
-use super::{Error, FANOUT, LEAF_SIZE, Nearest, Radii, RadiusSearch, check_points, packet, walk};
+use super::{Error, FANOUT, LEAF_SIZE, Nearest, NearestLists, Radii, RadiusSearch, check_points, packet, radix, walk};
 use crate::math::morton;
 
 const _: () = assert!(LEAF_SIZE == FANOUT && FANOUT as usize == WIDTH);
+/// Bits of a Morton key that are sorted by only where the others agree.
+const LOWER: u32 = 31;
 /// No box is nearer than this to anything: padding of incomplete groups.
 const FAR: f32 = f32::INFINITY;
 
@@ -41,7 +43,11 @@ pub struct PointBvh {
     pub(super) boxes: Vec<Octet>,
     /// First octet of each level.
     pub(super) levels: Vec<u32>,
-    keys: Vec<(u64, u32)>,
+    /// What is sorted, and room for it.
+    words: Vec<u64>,
+    other: Vec<u64>,
+    /// Boxes of the level that is built.
+    bounds: Vec<(Vec3, Vec3)>,
 }
 
 impl PointBvh {
@@ -73,20 +79,23 @@ impl PointBvh {
         if n == 0 {
             return;
         }
-        let mut bounds: Vec<(Vec3, Vec3)> = self
-            .leaves
+        self.leaves
             .par_iter()
             .with_min_len(1024)
             .enumerate()
             .map(|(leaf, points)| points.bounds((n - leaf * WIDTH).min(WIDTH)))
-            .collect();
+            .collect_into_vec(&mut self.bounds);
         loop {
             self.levels.push(self.boxes.len() as u32);
-            self.boxes.extend(bounds.chunks(WIDTH).map(Octet::of));
-            if bounds.len() == 1 {
+            self.boxes.extend(self.bounds.chunks(WIDTH).map(Octet::of));
+            let above = self.bounds.len().div_ceil(WIDTH);
+            if self.bounds.len() == 1 {
                 break;
             }
-            bounds = bounds.chunks(WIDTH).map(union).collect();
+            for k in 0..above {
+                self.bounds[k] = union(&self.bounds[k * WIDTH..((k + 1) * WIDTH).min(self.bounds.len())]);
+            }
+            self.bounds.truncate(above);
         }
     }
 
@@ -99,16 +108,20 @@ impl PointBvh {
             .fold(|| nothing, |(min, max), i| (min.min(point(i)), max.max(point(i))))
             .reduce(|| nothing, |a, b| (a.0.min(b.0), a.1.max(b.1)));
         let scale = (max - min).map(|extent| if extent > 0.0 { morton::CELLS / extent } else { 0.0 });
-        (0..n)
-            .into_par_iter()
-            .with_min_len(8192)
-            .map(|i| {
-                let cell = ((point(i) - min) * scale).min(Vec3::splat(morton::CELLS - 1.0)).as_uvec3();
-                (morton::interleave(cell.to_array()), i as u32)
-            })
-            .collect_into_vec(&mut self.keys);
-        self.keys.par_sort_unstable();
-        self.keys.par_iter().with_min_len(8192).map(|k| k.1).collect_into_vec(&mut self.order);
+        let key = |i: usize| {
+            let cell = ((point(i) - min) * scale).min(Vec3::splat(morton::CELLS - 1.0)).as_uvec3();
+            morton::interleave(cell.to_array())
+        };
+        // The upper half of each key before the index; the few that agree in it are sorted by the whole key.
+        let word = |i: usize| key(i) >> LOWER << 32 | i as u64;
+        (0..n).into_par_iter().with_min_len(8192).map(word).collect_into_vec(&mut self.words);
+        self.other.resize(n, 0);
+        radix::sort(&mut self.words, &mut self.other, 32, 63 - LOWER);
+        let whole = |&word: &u64| key(word as u32 as usize);
+        for run in self.words.chunk_by_mut(|a, b| a >> 32 == b >> 32) {
+            if run.len() < 20 { run.sort_by_key(whole) } else { run.sort_by_cached_key(whole) }
+        }
+        self.words.par_iter().with_min_len(8192).map(|&word| word as u32).collect_into_vec(&mut self.order);
         self.order.resize(n.next_multiple_of(WIDTH), u32::MAX);
     }
 
@@ -171,7 +184,7 @@ impl RadiusSearch for PointBvh {
     }
 
     fn nearest(&self, centre: Vec3, radius: f32, nearest: &mut Nearest) {
-        walk::nearest(self, centre, radius, nearest);
+        walk::nearest(self, 1, |_| (centre, radius), nearest, |_, _| ());
     }
 
     fn fold_all<T: Send>(
@@ -182,6 +195,10 @@ impl RadiusSearch for PointBvh {
         visit: impl Fn(&mut T, u32, f32) + Sync,
     ) -> Result<Vec<T>, Error> {
         packet::fold_all(self, queries, radii, start, visit)
+    }
+
+    fn nearest_all(&self, queries: &[Vec3], radii: Radii<'_>, k: usize) -> Result<NearestLists, Error> {
+        packet::nearest_all(self, queries, radii, k)
     }
 }
 

@@ -11,7 +11,8 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::batch::fold_each;
-use super::blocks::{Blocks, Splat, bounds, reach, splat};
+use super::blocks::{self, Blocks, Hits, Splat, Walk, bounds, reach, splat};
+use super::lanes::Lanes;
 use super::stats::{CountVisits, Tally, Visits};
 use super::{Error, Nearest, Radii, RadiusSearch, check_points, check_radius, radius2};
 
@@ -129,46 +130,17 @@ impl HashGrid {
         self.slots = slots;
     }
 
-    /// Visits what is within the reach, nearest rows of cells first; `bound` of the state may shrink as `visit` changes it.
-    #[inline]
-    fn walk<S, B>(
+    #[inline(always)]
+    fn scan_row<L: Lanes, S, B>(
         &self,
-        centre: Vec3,
-        radius: f32,
-        state: &mut S,
-        tally: &mut impl Tally,
-        bound: impl Fn(&S) -> f32,
-        mut visit: impl FnMut(&mut S, u32, f32) -> ControlFlow<B>,
-    ) -> ControlFlow<B> {
-        if self.is_empty() {
-            return ControlFlow::Continue(());
-        }
-        let reach = reach(radius2(radius));
-        let Some(x) = self.window(centre.x, reach, 0) else { return ControlFlow::Continue(()) };
-        let Some(y) = self.window(centre.y, reach, 1) else { return ControlFlow::Continue(()) };
-        let Some(z) = self.window(centre.z, reach, 2) else { return ControlFlow::Continue(()) };
-        let (ys, zs) = (self.rows(centre.y, y, 1), self.rows(centre.z, z, 2));
-        let splat = splat(centre);
-        for &(z, z2) in &zs[..=(z.1 - z.0) as usize] {
-            for &(y, y2) in &ys[..=(y.1 - y.0) as usize] {
-                if y2 + z2 <= bound(state) {
-                    self.scan_row(self.hash.row(y, z), x, &splat, state, tally, &bound, &mut visit)?;
-                }
-            }
-        }
-        ControlFlow::Continue(())
-    }
-
-    #[inline]
-    fn scan_row<S, B>(
-        &self,
+        on: L,
         row: Row,
         (mut x, last): (u32, u32),
-        splat: &Splat,
+        splat: &Splat<L>,
         state: &mut S,
         tally: &mut impl Tally,
         bound: &impl Fn(&S) -> f32,
-        visit: &mut impl FnMut(&mut S, u32, f32) -> ControlFlow<B>,
+        visit: &mut impl FnMut(&mut S, Hits<L>) -> ControlFlow<B>,
     ) -> ControlFlow<B> {
         // Cells of a row lie side by side, up to the end of the brick.
         while x <= last {
@@ -176,7 +148,7 @@ impl HashGrid {
             let slot = row.slot(x);
             let (from, to) = (self.starts[slot], self.starts[slot + (end - x) as usize + 1]);
             tally.node();
-            self.blocks.scan(from as usize..to as usize, splat, state, tally, bound, visit)?;
+            self.blocks.scan(on, from as usize..to as usize, splat, state, tally, bound, visit)?;
             x = end + 1;
         }
         ControlFlow::Continue(())
@@ -224,9 +196,42 @@ impl HashGrid {
     }
 }
 
+impl Walk for HashGrid {
+    /// Visits what is within the reach, nearest rows of cells first; `bound` of the state may shrink as `visit` changes it.
+    #[inline(always)]
+    fn walk<L: Lanes, S, B>(
+        &self,
+        on: L,
+        centre: Vec3,
+        radius: f32,
+        state: &mut S,
+        tally: &mut impl Tally,
+        bound: impl Fn(&S) -> f32,
+        mut visit: impl FnMut(&mut S, Hits<L>) -> ControlFlow<B>,
+    ) -> ControlFlow<B> {
+        if self.is_empty() {
+            return ControlFlow::Continue(());
+        }
+        let reach = reach(radius2(radius));
+        let Some(x) = self.window(centre.x, reach, 0) else { return ControlFlow::Continue(()) };
+        let Some(y) = self.window(centre.y, reach, 1) else { return ControlFlow::Continue(()) };
+        let Some(z) = self.window(centre.z, reach, 2) else { return ControlFlow::Continue(()) };
+        let (ys, zs) = (self.rows(centre.y, y, 1), self.rows(centre.z, z, 2));
+        let splat = splat(on, centre);
+        for &(z, z2) in &zs[..=(z.1 - z.0) as usize] {
+            for &(y, y2) in &ys[..=(y.1 - y.0) as usize] {
+                if y2 + z2 <= bound(state) {
+                    self.scan_row(on, self.hash.row(y, z), x, &splat, state, tally, &bound, &mut visit)?;
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
+
 impl RadiusSearch for HashGrid {
     fn len(&self) -> usize {
-        self.blocks.order.len()
+        self.blocks.len()
     }
 
     fn max_radius(&self) -> f32 {
@@ -238,19 +243,13 @@ impl RadiusSearch for HashGrid {
         &self,
         centre: Vec3,
         radius: f32,
-        mut visit: impl FnMut(u32, f32) -> ControlFlow<B>,
+        visit: impl FnMut(u32, f32) -> ControlFlow<B>,
     ) -> ControlFlow<B> {
-        self.walk(centre, radius, &mut radius2(radius), &mut (), |r2| *r2, |_, i, d2| visit(i, d2))
+        blocks::within(self, centre, radius, visit)
     }
 
     fn nearest(&self, centre: Vec3, radius: f32, nearest: &mut Nearest) {
-        nearest.clear();
-        let radius2 = radius2(radius);
-        let bound = |nearest: &&mut Nearest| nearest.bound().min(radius2);
-        let _: ControlFlow<()> = self.walk(centre, radius, &mut &mut *nearest, &mut (), bound, |nearest, i, d2| {
-            nearest.insert(i, d2);
-            ControlFlow::Continue(())
-        });
+        blocks::nearest(self, centre, radius, nearest);
     }
 
     fn fold_all<T: Send>(
@@ -287,21 +286,7 @@ impl RadiusSearch for HashGrid {
 impl CountVisits for HashGrid {
     /// A node is a run of cells that lie side by side.
     fn visits(&self, centre: Vec3, radius: f32) -> Visits {
-        let mut visits = Visits::default();
-        let mut found = 0;
-        let _: ControlFlow<()> = self.walk(
-            centre,
-            radius,
-            &mut radius2(radius),
-            &mut visits,
-            |r2| *r2,
-            |_, _, _| {
-                found += 1;
-                ControlFlow::Continue(())
-            },
-        );
-        visits.found = found;
-        visits
+        blocks::visits(self, centre, radius)
     }
 }
 

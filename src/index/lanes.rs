@@ -28,6 +28,9 @@ pub trait Lanes: Copy {
     /// The same for integers.
     fn compress_u32(self, bits: u8, x: &[u32; WIDTH]) -> [u32; WIDTH];
 
+    /// The first of the least among the lanes whose bit is set, and its number; infinite if no bit is set.
+    fn least(self, bits: u8, x: Self::F32) -> (f32, u32);
+
     /// x² + y² + z², from left to right.
     #[inline(always)]
     fn length2(self, [x, y, z]: [Self::F32; 3]) -> Self::F32 {
@@ -106,6 +109,17 @@ impl Lanes for Portable {
     #[inline(always)]
     fn compress_u32(self, bits: u8, x: &[u32; WIDTH]) -> [u32; WIDTH] {
         packed(bits, x)
+    }
+
+    #[inline(always)]
+    fn least(self, bits: u8, x: Self::F32) -> (f32, u32) {
+        let (mut least, mut lane) = (f32::INFINITY, 0);
+        for (i, x) in (0..).zip(x.to_array()) {
+            if bits >> i & 1 == 1 && x < least {
+                (least, lane) = (x, i);
+            }
+        }
+        (least, lane)
     }
 }
 
@@ -216,6 +230,20 @@ mod x86 {
         #[inline(always)]
         fn compress_u32(self, bits: u8, x: &[u32; WIDTH]) -> [u32; WIDTH] {
             cast(front(self, bits, cast(*x)))
+        }
+
+        #[inline(always)]
+        fn least(self, bits: u8, x: __m256) -> (f32, u32) {
+            let bit: __m256i = cast([1i32, 2, 4, 8, 16, 32, 64, 128]);
+            let set = self.avx2._mm256_and_si256(self.avx._mm256_set1_epi32(i32::from(bits)), bit);
+            let set: __m256 = cast(self.avx2._mm256_cmpeq_epi32(set, bit));
+            let x = self.avx._mm256_blendv_ps(self.splat(f32::INFINITY), x, set);
+            // The least of all lanes, in all lanes.
+            let m = self.avx._mm256_min_ps(x, self.avx._mm256_permute2f128_ps::<1>(x, x));
+            let m = self.avx._mm256_min_ps(m, self.avx._mm256_permute_ps::<0b01_00_11_10>(m));
+            let m = self.avx._mm256_min_ps(m, self.avx._mm256_permute_ps::<0b10_11_00_01>(m));
+            let at = self.le(x, m);
+            (self.store(m)[0], u32::from(at).trailing_zeros())
         }
     }
 }

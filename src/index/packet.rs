@@ -9,8 +9,8 @@ use rayon::prelude::*;
 
 use super::bvh::PointBvh;
 use super::lanes::{Lanes, Task, WIDTH, dispatch};
-use super::walk::{Reach, Walk, distance2, leaf_ids};
-use super::{Error, Radii, RadiusSearch, radius2};
+use super::walk::{self, Reach, Walk, distance2, leaf_ids};
+use super::{Error, Nearest, NearestLists, Radii, RadiusSearch, radius2, radix};
 use crate::math::morton;
 
 /// Most queries in a packet.
@@ -176,7 +176,7 @@ pub fn fold_all<T: Send>(
 ) -> Result<Vec<T>, Error> {
     radii.check(queries, tree.max_radius())?;
     let mut states: Vec<T> = (0..queries.len()).into_par_iter().with_min_len(4096).map(|i| start(i)).collect();
-    let size = queries.len().div_ceil(2 * rayon::current_num_threads()).clamp(BLOCK[0], BLOCK[1]);
+    let size = block_size(queries.len());
     states.par_chunks_mut(size).enumerate().for_each(|(block, states)| {
         let first = block * size;
         let query = |i: usize| (queries[first + i], radii.of(first + i));
@@ -214,6 +214,39 @@ fn is_coherent(n: usize, query: impl Fn(usize) -> (Vec3, f32)) -> bool {
     n_queries >= COHERENT * n_packets
 }
 
+/// Truncated k-NN of all queries, those that are close to each other soon after each other.
+pub fn nearest_all(tree: &PointBvh, queries: &[Vec3], radii: Radii<'_>, k: usize) -> Result<NearestLists, Error> {
+    let mut lists = NearestLists::none(queries, radii, tree.max_radius(), k)?;
+    let size = block_size(queries.len());
+    let rows = lists.indices.par_chunks_mut(size * k).zip(lists.distances2.par_chunks_mut(size * k));
+    rows.zip(lists.found.par_chunks_mut(size)).enumerate().for_each(|(block, ((indices, distances2), found))| {
+        let first = block * size;
+        let query = |i: usize| (queries[first + i], radii.of(first + i));
+        let order = if is_coherent(found.len(), query) { None } else { Some(sorted(found.len(), query)) };
+        let at = |i: usize| order.as_ref().map_or(i, |order| order[i] as u32 as usize);
+        walk::nearest(
+            tree,
+            found.len(),
+            |i| query(at(i)),
+            &mut Nearest::new(k),
+            |i, nearest| {
+                let i = at(i);
+                found[i] = nearest.found().len() as u32;
+                let row = indices[i * k..].iter_mut().zip(&mut distances2[i * k..]);
+                for ((index, distance2), neighbour) in row.zip(nearest.found()) {
+                    (*index, *distance2) = (neighbour.index, neighbour.distance2);
+                }
+            },
+        );
+    });
+    Ok(lists)
+}
+
+/// Queries a thread takes at once.
+fn block_size(n: usize) -> usize {
+    n.div_ceil(2 * rayon::current_num_threads()).clamp(BLOCK[0], BLOCK[1])
+}
+
 /// Queries in Morton order, the number of each in the lower half.
 fn sorted(n: usize, query: impl Fn(usize) -> (Vec3, f32)) -> Vec<u64> {
     let (mut min, mut max, mut sum) = (Vec3::INFINITY, Vec3::NEG_INFINITY, 0.0f64);
@@ -221,11 +254,10 @@ fn sorted(n: usize, query: impl Fn(usize) -> (Vec3, f32)) -> Vec<u64> {
         let (centre, radius) = query(i);
         (min, max, sum) = (min.min(centre), max.max(centre), sum + f64::from(radius));
     }
-    // Cells of half a radius, but no more than tell the queries apart.
+    // Cells of half a radius, but no more than tell the queries apart, and enough for the tree where radii are large.
     let extent = max - min;
     let cells = 2.0 * f64::from(extent.max_element()) * n as f64 / sum;
-    let most = (n.ilog2() / 2 + 1).min(10) as i32;
-    let bits = (cells.log2().ceil() as i32).clamp(1, most) as u32;
+    let bits = (cells.log2().ceil() as i32).clamp(5, (n.ilog2() as i32 / 2 + 1).clamp(5, 10)) as u32;
     let size = ((1u32 << bits) - 1) as f32;
     let scale = extent.map(|extent| if extent > 0.0 { size / extent } else { 0.0 });
     let key = |i: usize| {
@@ -234,29 +266,6 @@ fn sorted(n: usize, query: impl Fn(usize) -> (Vec3, f32)) -> Vec<u64> {
     };
     let mut keys: Vec<u64> = (0..n).map(key).collect();
     let mut other = vec![0; n];
-    let passes = (3 * bits).div_ceil(11);
-    let width = (3 * bits).div_ceil(passes);
-    for pass in 0..passes {
-        scatter(&keys, &mut other, 32 + pass * width, width);
-        std::mem::swap(&mut keys, &mut other);
-    }
+    radix::sort(&mut keys, &mut other, 32, 3 * bits);
     keys
-}
-
-/// One pass of a radix sort: stable, by `width` bits from `shift` on.
-fn scatter(from: &[u64], to: &mut [u64], shift: u32, width: u32) {
-    let digit = |key: u64| (key >> shift) as usize & ((1 << width) - 1);
-    let mut at = vec![0u32; 1 << width];
-    for &key in from {
-        at[digit(key)] += 1;
-    }
-    let mut sum = 0;
-    for n in &mut at {
-        (*n, sum) = (sum, sum + *n);
-    }
-    for &key in from {
-        let at = &mut at[digit(key)];
-        to[*at as usize] = key;
-        *at += 1;
-    }
 }

@@ -1,4 +1,4 @@
-//! The walk through the tree of [`PointBvh`], one query at a time.
+//! The walk through the tree of [`PointBvh`], and the searches that take one query at a time.
 
 use std::ops::ControlFlow;
 
@@ -47,9 +47,9 @@ impl<L: Lanes> Reach<L> {
 
     /// An octet with those of its boxes that come within √bound, and the squared distances of all.
     #[inline(always)]
-    fn enter(&self, on: L, tree: &PointBvh, level: usize, octet: u32, bound: f32) -> (u32, u32, [f32; WIDTH]) {
+    fn enter(&self, on: L, tree: &PointBvh, level: usize, octet: u32, bound: f32) -> Pending {
         let d2 = self.distance2(on, &tree.boxes[(tree.levels[level] + octet) as usize]);
-        (octet, u32::from(on.le(d2, on.splat(bound))), on.store(d2))
+        (octet, on.le(d2, on.splat(bound)), on.store(d2))
     }
 
     /// Bit i: point i is reached.
@@ -174,66 +174,85 @@ pub fn leaf_ids(tree: &PointBvh, leaf: u32, slots: bool) -> [u32; WIDTH] {
     }
 }
 
-struct NearestOf<'a> {
+struct NearestOf<'a, Q, R> {
     tree: &'a PointBvh,
-    centre: Vec3,
-    radius: f32,
+    n: usize,
+    query: Q,
     nearest: &'a mut Nearest,
+    report: R,
 }
 
-/// Truncated k-NN: replaces what is in `nearest`.
-pub fn nearest(tree: &PointBvh, centre: Vec3, radius: f32, nearest: &mut Nearest) {
-    nearest.clear();
-    dispatch(NearestOf { tree, centre, radius, nearest });
+/// Truncated k-NN of `query(i)`, a centre and a radius, for each i below `n`: `report(i, what was found)`.
+#[inline]
+pub fn nearest(
+    tree: &PointBvh,
+    n: usize,
+    query: impl Fn(usize) -> (Vec3, f32),
+    nearest: &mut Nearest,
+    report: impl FnMut(usize, &Nearest),
+) {
+    dispatch(NearestOf { tree, n, query, nearest, report });
 }
 
-impl Task for NearestOf<'_> {
+impl<Q: Fn(usize) -> (Vec3, f32), R: FnMut(usize, &Nearest)> Task for NearestOf<'_, Q, R> {
     type Output = ();
 
-    /// Nearer children first; each is entered only if its box is still near enough when its turn comes.
     #[inline(always)]
-    fn run<L: Lanes>(self, on: L) {
-        let Self { tree, centre, radius, nearest } = self;
-        let Some(top) = tree.levels.len().checked_sub(1) else { return };
-        let radius2 = radius2(radius);
-        let reach = Reach::new(on, centre, centre, radius2);
-        // Of each level: octet, children still to be entered, and their squared distances.
-        let mut pending = [(0u32, 0u32, [0.0f32; WIDTH]); MAX_LEVELS];
-        let mut level = top;
-        pending[top] = reach.enter(on, tree, top, 0, radius2);
-        loop {
-            let bound = nearest.bound().min(radius2);
-            let (octet, bits, d2) = &mut pending[level];
-            let (mut least, mut child, mut rest) = (f32::INFINITY, 0, *bits);
-            while rest != 0 {
-                let i = rest.trailing_zeros();
-                rest &= rest - 1;
-                if d2[i as usize] < least {
-                    (least, child) = (d2[i as usize], i);
-                }
-            }
-            if least > bound {
-                if level == top {
-                    return;
-                }
-                level += 1;
-                continue;
-            }
-            *bits &= !(1 << child);
-            let child = *octet * FANOUT + child;
-            if level > 0 {
-                level -= 1;
-                pending[level] = reach.enter(on, tree, level, child, bound);
-                continue;
-            }
-            let d2 = distance2(on, &tree.leaves[child as usize].0.each_ref().map(|c| &c.0), &reach.min);
-            let mut inside = on.le(d2, on.splat(bound));
-            let d2 = on.store(d2);
-            while inside != 0 {
-                let i = inside.trailing_zeros();
-                inside &= inside - 1;
-                nearest.insert(tree.order[(child * LEAF_SIZE + i) as usize], d2[i as usize]);
-            }
+    fn run<L: Lanes>(mut self, on: L) {
+        let mut pending = [(0, 0, [0.0; WIDTH]); MAX_LEVELS];
+        for i in 0..self.n {
+            let (centre, radius) = (self.query)(i);
+            self.nearest.clear();
+            nearest_one(on, self.tree, centre, radius, self.nearest, &mut pending);
+            (self.report)(i, self.nearest);
         }
+    }
+}
+
+/// Of a level: octet, children still to be entered, and the squared distances of all.
+type Pending = (u32, u8, [f32; WIDTH]);
+
+/// Nearer children first; each is entered only if its box is still near enough when its turn comes.
+#[inline(always)]
+fn nearest_one<L: Lanes>(
+    on: L,
+    tree: &PointBvh,
+    centre: Vec3,
+    radius: f32,
+    nearest: &mut Nearest,
+    pending: &mut [Pending; MAX_LEVELS],
+) {
+    let Some(top) = tree.levels.len().checked_sub(1) else { return };
+    let radius2 = radius2(radius);
+    let reach = Reach::new(on, centre, centre, radius2);
+    let mut level = top;
+    pending[top] = reach.enter(on, tree, top, 0, radius2);
+    let mut bound = radius2;
+    loop {
+        let (octet, bits, d2) = &mut pending[level];
+        let (least, child) = on.least(*bits, on.load(d2));
+        if least > bound {
+            if level == top {
+                return;
+            }
+            level += 1;
+            continue;
+        }
+        *bits &= !(1 << child);
+        let child = *octet * FANOUT + child;
+        if level > 0 {
+            level -= 1;
+            pending[level] = reach.enter(on, tree, level, child, bound);
+            continue;
+        }
+        let d2 = distance2(on, &tree.leaves[child as usize].0.each_ref().map(|c| &c.0), &reach.min);
+        let mut inside = on.le(d2, on.splat(bound));
+        let d2 = on.store(d2);
+        while inside != 0 {
+            let i = inside.trailing_zeros();
+            inside &= inside - 1;
+            nearest.insert(tree.order[(child * LEAF_SIZE + i) as usize], d2[i as usize]);
+        }
+        bound = nearest.bound().min(radius2);
     }
 }

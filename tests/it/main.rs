@@ -22,6 +22,8 @@ mod loading;
 #[cfg(feature = "render")]
 mod physics;
 #[cfg(feature = "render")]
+mod points;
+#[cfg(feature = "render")]
 mod reference;
 #[cfg(feature = "render")]
 mod sampling;

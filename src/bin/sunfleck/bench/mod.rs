@@ -15,6 +15,7 @@ mod entrants;
 mod gathers;
 mod indices;
 mod measure;
+mod paper;
 mod photons;
 mod plot;
 mod points;
@@ -33,9 +34,6 @@ use sunfleck::scene::settings::parse_count;
 
 use crate::progress;
 use report::Report;
-
-/// Who computed in the paper.
-const PAPER_DEVICE: &str = "NVIDIA RTX 2080 Ti, OptiX 7.2 against the GPU version of FLANN";
 
 const EXAMPLES: &str = "\
 Examples:

@@ -29,7 +29,7 @@ use super::gathers::{self, Gathered};
 use super::measure::{Time, Times, timed};
 use super::plot::{self, Bars};
 use super::report::{self, Machine, Report, Row};
-use super::{Common, PAPER_DEVICE, Steps, short};
+use super::{Common, Steps, paper, short};
 use crate::cli::Usage;
 use crate::devices::{self, Device};
 use crate::job::{Input, use_paper_mode};
@@ -40,48 +40,6 @@ const NOTES: &[&str] = &[
     "in place: the renderer's stages; kd-buffered: all neighbours into rows as long as needed, then summed",
     "the scenes are not the paper's, only alike",
 ];
-
-/// Table 1, milliseconds: for 100K, 200K, 500K and 1000K paths build and gather, OptiX before FLANN.
-const PAPER: [(&str, [[[f64; 2]; 2]; 4]); 4] = [
-    (
-        "glass",
-        [
-            [[1.3, 42.0], [5.6, 8.0]],
-            [[2.0, 61.9], [5.3, 27.9]],
-            [[5.2, 99.9], [5.8, 48.4]],
-            [[9.4, 175.9], [6.3, 90.4]],
-        ],
-    ),
-    (
-        "pool",
-        [
-            [[1.9, 47.1], [5.8, 4.7]],
-            [[3.7, 63.3], [6.9, 7.8]],
-            [[7.9, 123.7], [8.0, 25.1]],
-            [[15.1, 222.2], [12.2, 46.1]],
-        ],
-    ),
-    (
-        "bathroom",
-        [
-            [[2.0, 53.1], [7.3, 15.6]],
-            [[3.2, 68.9], [9.6, 46.1]],
-            [[7.6, 123.4], [16.3, 83.7]],
-            [[14.6, 229.9], [33.4, 131.9]],
-        ],
-    ),
-    (
-        "fireplace",
-        [
-            [[1.8, 56.8], [8.4, 14.7]],
-            [[3.7, 73.5], [11.0, 42.1]],
-            [[6.7, 141.6], [22.6, 72.1]],
-            [[12.2, 220.3], [43.0, 108.6]],
-        ],
-    ),
-];
-/// Of the table's columns.
-const PAPER_PATHS: [u32; 4] = [100_000, 200_000, 500_000, 1_000_000];
 
 #[derive(Debug, Args)]
 pub struct PhotonsArgs {
@@ -205,10 +163,10 @@ impl Plan {
         };
         let backends: &[&str] = if devices::has_real_gpu() { &["cpu", "gpu"] } else { &["cpu"] };
         Self {
-            scenes: or(&args.scene, &PAPER.map(|row| row.0)),
+            scenes: or(&args.scene, &paper::TABLE_1.map(|row| row.0)),
             paths: match (args.photons.as_slice(), quick) {
-                ([], true) => PAPER_PATHS[..1].to_vec(),
-                ([], false) => PAPER_PATHS.to_vec(),
+                ([], true) => paper::TABLE_1_PATHS[..1].to_vec(),
+                ([], false) => paper::TABLE_1_PATHS.to_vec(),
                 (some, _) => some.to_vec(),
             },
             size: args.resolution.unwrap_or(if quick { [480, 270] } else { [1920, 1080] }),
@@ -393,23 +351,19 @@ fn print(machine: &Machine, plan: &Plan, cells: &[Cell]) {
                 let [build, gather] = cell.ms().map(report::figure);
                 line.push(format!("{build} / {gather}"));
             }
-            let row = PAPER.iter().find(|row| row.0 == scene).map(|row| row.1);
-            let paper = row.zip(PAPER_PATHS.iter().position(|&p| p == paths)).map(|(row, column)| row[column]);
-            line.extend((0..2).map(|who| match paper {
-                Some([build, gather]) => format!("{} / {}", build[who], gather[who]),
-                None => "–".to_owned(),
-            }));
+            line.extend(paper::columns(paper::table_1(scene, paths)));
             lines.push(line);
         }
     }
-    header.extend(["paper, OptiX".to_owned(), "paper, FLANN".to_owned()]);
+    header.extend(paper::HEADINGS.map(str::to_owned));
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
     let [width, height] = plan.size;
     crate::print(&format!(
         "\nTable 1: build / gather, ms an iteration, mean of {} iterations. Ours, {width}x{height}: {}. The paper's, \
-         1920x1080: {PAPER_DEVICE}, other scenes of the same names.\n{}",
+         1920x1080: {}, other scenes of the same names.\n{}",
         plan.iterations,
         machine.line(),
+        paper::DEVICE,
         report::table(&header, 2, lines),
     ));
 }

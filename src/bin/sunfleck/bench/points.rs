@@ -22,7 +22,7 @@ use super::contest::{self, Operation, Question, Score};
 use super::entrants::{self, KD, METHOD};
 use super::plot::{self, Bars};
 use super::report::{self, Machine, Report, Row};
-use super::{Common, PAPER_DEVICE, Rounds, count, short};
+use super::{Common, Rounds, count, paper, short};
 
 const NOTES: &[&str] = &[
     "operation: the k nearest within the radius, k = 1: one half of the cloud in the other, k = 4 and 8: all in all",
@@ -31,14 +31,6 @@ const NOTES: &[&str] = &[
 
 /// Standard deviation of the scanners' error; the surface is about 2 across.
 const NOISE: f64 = 5e-4;
-
-/// Figure 7, milliseconds: points, build (k = 1, then k = 4 and 8), search (k = 1, 4, 8); OptiX before FLANN.
-const PAPER: [(usize, [[f64; 2]; 2], [[f64; 2]; 3]); 4] = [
-    (100_000, [[1.4, 21.4], [2.4, 26.2]], [[0.1, 0.4], [0.2, 0.7], [0.5, 0.9]]),
-    (350_000, [[3.3, 29.1], [4.9, 37.4]], [[0.2, 0.7], [1.0, 1.7], [1.9, 2.6]]),
-    (500_000, [[4.5, 35.2], [6.5, 42.4]], [[0.3, 0.9], [1.6, 2.6], [3.4, 3.7]]),
-    (1_000_000, [[7.8, 45.4], [11.8, 59.6]], [[1.1, 2.2], [4.3, 6.4], [8.1, 8.2]]),
-];
 
 const TASKS: [usize; 3] = [1, 4, 8];
 
@@ -90,8 +82,8 @@ impl Cell {
 pub fn run(args: &PointsArgs) -> Result<()> {
     let common = &args.common;
     let sizes: Vec<usize> = match (args.points.as_slice(), common.quick) {
-        ([], true) => vec![50_000, PAPER[0].0],
-        ([], false) => PAPER.iter().map(|row| row.0).collect(),
+        ([], true) => vec![50_000, paper::FIGURE_7[0].0],
+        ([], false) => paper::FIGURE_7.iter().map(|row| row.0).collect(),
         (some, _) => some.to_vec(),
     };
     let figure = [common.figure("figure7")];
@@ -158,7 +150,7 @@ fn print(machine: &Machine, sizes: &[usize], cells: &[Cell]) {
     let mut header = vec!["points", "k", "radius"];
     let mut lines = Vec::new();
     for &n in sizes {
-        for (task, k) in TASKS.into_iter().enumerate() {
+        for k in TASKS {
             let mut line = vec![short(n), k.to_string()];
             for cell in cells.iter().filter(|c| (c.points, c.k) == (n, k)) {
                 if line.len() == 2 {
@@ -170,19 +162,16 @@ fn print(machine: &Machine, sizes: &[usize], cells: &[Cell]) {
                 let [build, search] = cell.ms().map(report::figure);
                 line.push(format!("{build} / {search}"));
             }
-            let paper = PAPER.iter().find(|row| row.0 == n);
-            line.extend((0..2).map(|who| match paper {
-                Some((_, build, search)) => format!("{} / {}", build[task.min(1)][who], search[task][who]),
-                None => "–".to_owned(),
-            }));
+            line.extend(paper::columns(paper::figure_7(n, k)));
             lines.push(line);
         }
     }
-    header.extend(["paper, OptiX", "paper, FLANN"]);
+    header.extend(paper::HEADINGS);
     crate::print(&format!(
         "\nFigure 7: build / search, wall ms. Ours ({METHOD} is the paper's method, {KD} stands for its rival): {}. The \
-         paper's: {PAPER_DEVICE}, scans with as many points.\n{}",
+         paper's: {}, scans with as many points.\n{}",
         machine.line(),
+        paper::DEVICE,
         report::table(&header, 0, lines),
     ));
 }

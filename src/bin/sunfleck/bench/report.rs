@@ -170,11 +170,6 @@ pub fn milliseconds(times: &Times) -> String {
     format!("{} ({} – {})", figure(1e3 * median), figure(1e3 * least), figure(1e3 * most))
 }
 
-/// "2.3×".
-pub fn ratio(x: f64) -> String {
-    if x.is_finite() { format!("{}×", figure(x)) } else { "–".to_owned() }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -187,6 +182,5 @@ mod tests {
         assert_eq!(figure(1.234), "1.23");
         assert_eq!(figure(0.012), "0.0120");
         assert_eq!(figure(f64::NAN), "–");
-        assert_eq!(ratio(2.345), "2.35×");
     }
 }

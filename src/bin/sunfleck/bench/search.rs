@@ -25,7 +25,7 @@ use super::contest::{self, Operation, Question, Score};
 use super::entrants::{self, DEFAULT, METHOD, RIVAL};
 use super::plot::{self, Curves, Map, Series};
 use super::report::{self, Machine, Report, Row};
-use super::{Common, PAPER_DEVICE, Rounds, count, length, short};
+use super::{Common, Rounds, count, length, paper, short};
 
 const NOTES: &[&str] = &[
     "operation: all neighbours of every query are stored with their squared distances",
@@ -85,22 +85,6 @@ impl Distribution {
         match self {
             Self::Uniform => [3, 4],
             Self::Gaussian => [5, 6],
-        }
-    }
-
-    /// What the paper says of its figures.
-    fn claims(self) -> [&'static str; 2] {
-        match self {
-            Self::Uniform => [
-                "The paper: with small radii its method is faster than FLANN for all numbers of samples and queries; with \
-                 large radii FLANN becomes faster as both grow.",
-                "The paper: low density, its method is faster at every radius; high density, it falls behind rapidly \
-                 even at small radii.",
-            ],
-            Self::Gaussian => [
-                "The paper: its method is faster than FLANN for all numbers of samples and queries.",
-                "The paper: its method is faster at every radius.",
-            ],
         }
     }
 }
@@ -380,10 +364,10 @@ fn draw_curves(path: &std::path::Path, distribution: Distribution, plan: &Plan, 
     plot::curves(path, &title, &panels, panels.len())
 }
 
-/// Maps: as many queries as samples only; the rest is in the files.
+/// Maps: of the numbers that are both of samples and of queries, only as many queries as samples; the rest is in the files.
 fn print(machine: &Machine, plan: &Plan, cells: &[Cell]) {
     for &distribution in &plan.distributions {
-        for (figure, claim) in distribution.figures().into_iter().zip(distribution.claims()) {
+        for figure in distribution.figures() {
             let mut indices: Vec<&str> = Vec::new();
             let mut rows: Vec<(&Cell, Vec<String>)> = Vec::new();
             for cell in cells.iter().filter(|c| c.figure == figure) {
@@ -401,8 +385,8 @@ fn print(machine: &Machine, plan: &Plan, cells: &[Cell]) {
                 }
             }
             let is_map = figure % 2 == 1;
-            let shown =
-                rows.into_iter().filter(|(c, _)| !is_map || c.queries == c.samples || plan.densities.len() == 1);
+            let other = |c: &Cell| c.queries != c.samples && cells.iter().any(|d| d.samples == c.queries);
+            let shown = rows.into_iter().filter(|(c, _)| !is_map || !other(c));
             let lines = shown.map(|(cell, columns)| {
                 let mut line = vec![short(cell.samples), short(cell.queries), cell.radius.to_string()];
                 line.push(report::figure(cell.mean));
@@ -412,12 +396,13 @@ fn print(machine: &Machine, plan: &Plan, cells: &[Cell]) {
             let mut header = vec!["samples", "queries", "radius", "neighbours"];
             header.extend(&indices);
             crate::print(&format!(
-                "\nFigure {figure}, {} samples: build / search, wall ms, on {}\n{}\n{claim}\nThe paper's device: {}. \
+                "\nFigure {figure}, {} samples: build / search, wall ms, on {}\n{}\n{}\nThe paper's device: {}. \
                  Its text gives no times for this figure.",
                 distribution.name(),
                 machine.line(),
                 report::table(&header, 0, lines),
-                PAPER_DEVICE,
+                paper::claim(figure),
+                paper::DEVICE,
             ));
         }
     }
