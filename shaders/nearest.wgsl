@@ -1,5 +1,6 @@
 // The nearest points of each query, sorted, ties in order of the index. The lists lie in the results: the ball shrinks as
-// they fill, so that few points get that far.
+// they fill, so that few points get that far. So that it is small from the beginning, the points of the node that is
+// likely to hold the nearest ones come first.
 #import search
 
 @group(0) @binding(4) var<storage, read_write> found: array<u32>;
@@ -15,16 +16,35 @@ struct Visitor {
     radius2: f32,
     row: u32,
     n: u32,
+    // The SEEDS points from here on are known already.
+    seeds: u32,
 }
 
 // further.z: k.
-fn begin(query: u32, centre: vec3<f32>, radius: f32) -> Visitor {
+fn begin(query: u32, centre: vec3<f32>, radius2: f32) -> Visitor {
     var visitor: Visitor;
+    visitor.radius2 = radius2;
     visitor.row = query * arguments.further.z;
+    visitor.seeds = NONE;
+    let first = near_node(centre, arguments.further.y);
+    if first == NONE {
+        return visitor;
+    }
+    for (var slot = first; slot < min(first + SEEDS, arguments.further.x); slot++) {
+        let delta = position_of(slot) - centre;
+        let distance2 = delta.x * delta.x + delta.y * delta.y + delta.z * delta.z;
+        if distance2 <= visitor.radius2 {
+            visit(&visitor, slot, delta, distance2);
+        }
+    }
+    visitor.seeds = first;
     return visitor;
 }
 
 fn visit(visitor: ptr<function, Visitor>, slot: u32, delta: vec3<f32>, distance2: f32) {
+    if slot - (*visitor).seeds < SEEDS && (*visitor).seeds != NONE {
+        return;
+    }
     let k = arguments.further.z;
     let row = (*visitor).row;
     let bits = bitcast<u32>(distance2);

@@ -14,8 +14,9 @@ struct Visitor {
 }
 
 // further.z, 0: count, 1: write.
-fn begin(query: u32, centre: vec3<f32>, radius: f32) -> Visitor {
+fn begin(query: u32, centre: vec3<f32>, radius2: f32) -> Visitor {
     var visitor: Visitor;
+    visitor.radius2 = radius2;
     if arguments.further.z != 0u {
         visitor.next = offsets[query];
     }

@@ -5,6 +5,14 @@
 // one box a slot, around every place from which the point may lie within the largest radius (inflate.wgsl).
 #import common
 
+// Points that may be seen before the walk.
+const SEEDS: u32 = 0u;
+
+// The adapter does not tell where its boxes lie: NONE.
+fn near_node(centre: vec3<f32>, n_levels: u32) -> u32 {
+    return NONE;
+}
+
 fn walk(visitor: ptr<function, Visitor>, centre: vec3<f32>, n_points: u32, n_levels: u32) {
     var query: ray_query;
     // A ray that does not leave the place. Its direction has no zero, for the tests against boxes divide by it.

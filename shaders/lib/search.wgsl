@@ -1,8 +1,9 @@
 // A search for each of many queries over points in the order of a tree; `search` is the entry point.
 //
 // The module that imports this defines
-//   struct Visitor and fn visit, as for `walk`; the field radius2 is set here;
-//   fn begin(query: u32, centre: vec3<f32>, radius: f32) -> Visitor, before the first point;
+//   struct Visitor and fn visit, as for `walk`;
+//   fn begin(query: u32, centre: vec3<f32>, radius2: f32) -> Visitor, before the first point: its radius2 is what is
+//   searched;
 //   fn end(visitor: ptr<function, Visitor>, query: u32), after the last.
 // Queries come in any order, `query` is the one the caller knows. Bindings from 4 on are the module's own.
 #import tree
@@ -46,9 +47,9 @@ fn search(
         query = queries[at + 3u];
     }
     let radius = radii[query * arguments.values.w];
-    var visitor = begin(query, centre, radius);
     // Nothing is within a radius below zero, and everything within one whose square overflows.
-    visitor.radius2 = select(-1.0, min(radius * radius, LARGEST), radius >= 0.0);
+    let radius2 = select(-1.0, min(radius * radius, LARGEST), radius >= 0.0);
+    var visitor = begin(query, centre, radius2);
     walk(&visitor, centre, arguments.further.x, arguments.further.y);
     end(&visitor, query);
 }

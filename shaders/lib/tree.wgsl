@@ -22,8 +22,8 @@ fn bits_within(distance2: vec4<f32>, radius2: f32) -> u32 {
     return bits.x | bits.y | bits.z | bits.w;
 }
 
-// Bit i: child i comes within the radius of the centre.
-fn children_within(node: TreeNode, centre: vec3<f32>, radius2: f32) -> u32 {
+// Squared distances from the centre to the boxes of eight children. Of children that are not there they mean nothing.
+fn distances_to_children(node: TreeNode, centre: vec3<f32>) -> array<vec4<f32>, 2> {
     let scale = bitcast<vec3<f32>>(((vec3(node.exponents) >> vec3(0u, 8u, 16u)) & vec3(0xffu)) << vec3(23u));
     let near = outside(node.origin.x, scale.x, node.x.x, node.x.z, centre.x)
         + outside(node.origin.y, scale.y, node.y.x, node.y.z, centre.y)
@@ -31,8 +31,35 @@ fn children_within(node: TreeNode, centre: vec3<f32>, radius2: f32) -> u32 {
     let far = outside(node.origin.x, scale.x, node.x.y, node.x.w, centre.x)
         + outside(node.origin.y, scale.y, node.y.y, node.y.w, centre.y)
         + outside(node.origin.z, scale.z, node.z.y, node.z.w, centre.z);
+    return array(near, far);
+}
+
+// Bit i: child i comes within the radius of the centre.
+fn children_within(node: TreeNode, centre: vec3<f32>, radius2: f32) -> u32 {
+    let distances2 = distances_to_children(node, centre);
     let present = (1u << (node.exponents >> 24u)) - 1u;
-    return (bits_within(near, radius2) | (bits_within(far, radius2) << 4u)) & present;
+    return (bits_within(distances2[0], radius2) | (bits_within(distances2[1], radius2) << 4u)) & present;
+}
+
+// Points of a node of level 0.
+const SEEDS: u32 = LEAF_SIZE * FANOUT;
+
+// First point of a node of level 0, always the nearest child from the top down; NONE if there is no node.
+fn near_node(centre: vec3<f32>, n_levels: u32) -> u32 {
+    if n_levels < 2u {
+        return NONE;
+    }
+    var k = 0u;
+    for (var level = n_levels - 1u; level > 1u; level--) {
+        let node = tree[level_of(level).x - level_of(0u).y + k];
+        var children = distances_to_children(node, centre);
+        var nearest = 0u;
+        for (var i = 1u; i < (node.exponents >> 24u); i++) {
+            nearest = select(nearest, i, children[i / 4u][i % 4u] < children[nearest / 4u][nearest % 4u]);
+        }
+        k = k * FANOUT + nearest;
+    }
+    return k * SEEDS;
 }
 
 // Over `n_points`, whose tree has `n_levels` levels of boxes. It ends whatever is in the tree: levels only descend, and

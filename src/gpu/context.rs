@@ -3,7 +3,8 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
-use super::kernels::Cache;
+use super::buffers::Readback;
+use super::kernels::{Cache, Shared};
 use crate::device::Error;
 
 /// What an adapter is.
@@ -319,10 +320,23 @@ impl Context {
         self.limits.max_storage_buffer_binding_size
     }
 
-    /// Most bytes that can still be given to one array.
-    pub(super) fn most_bytes_new(&self) -> u64 {
-        let allowed = self.limits.max_storage_buffer_binding_size.min(self.limits.max_buffer_size);
-        allowed.min(self.budget.saturating_sub(self.used()))
+    /// Waits for the device and copies `n` elements of a buffer with usage `COPY_SRC` to the host, from a byte on that is a
+    /// multiple of 4. `T` is a multiple of 4 bytes.
+    pub fn download<T: bytemuck::Pod>(
+        &self,
+        buffer: &wgpu::Buffer,
+        first_byte: u64,
+        n: usize,
+    ) -> Result<Vec<T>, Error> {
+        if n == 0 {
+            return Ok(Vec::new());
+        }
+        Readback::default().read_from(self, &Shared::new(self, Vec::new()), buffer, first_byte, n)
+    }
+
+    /// Bytes that may still be given to buffers.
+    pub(super) fn budget_left(&self) -> u64 {
+        self.budget.saturating_sub(self.used())
     }
 
     /// Sets the most bytes that may lie in buffers.
@@ -396,7 +410,7 @@ impl Context {
         if bytes > self.limits.max_buffer_size {
             return Err(too_large(bytes, self.limits.max_buffer_size));
         }
-        let left = self.budget.saturating_sub(self.used());
+        let left = self.budget_left();
         if bytes > left {
             return Err(too_large(bytes, left));
         }

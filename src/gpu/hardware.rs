@@ -33,6 +33,8 @@ struct Trees {
     scene: wgpu::Tlas,
     /// As made; builds may have fewer boxes.
     size: wgpu::BlasAABBGeometrySizeDescriptor,
+    /// Others may not be bound.
+    built: bool,
 }
 
 impl Hardware {
@@ -77,7 +79,8 @@ impl Hardware {
     /// for queries of up to `radius`. Call [`Hardware::reserve`] first.
     pub(super) fn build(&mut self, batch: &mut Batch<'_>, n: u32, sorted: &Array, words: u32, radius: f32) {
         self.radius = radius;
-        let trees = self.trees.as_ref().expect("reserved before use");
+        let trees = self.trees.as_mut().expect("reserved before use");
+        trees.built = true;
         // An empty tree may not be bound.
         let n_boxes = n.max(1);
         let reach = (f64::from(radius) * SLACK).max(LEAST_REACH).min(f64::from(f32::MAX)) as f32;
@@ -102,7 +105,11 @@ impl Hardware {
         if radius > self.radius {
             return Err(index::Error::RadiusAboveBuilt { query, radius, built: self.radius }.into());
         }
-        let built = self.trees.as_ref().ok_or_else(|| context.error("the boxes of the points are not built".into()))?;
+        let built = self
+            .trees
+            .as_ref()
+            .filter(|trees| trees.built)
+            .ok_or_else(|| context.error("the boxes of the points are not built".into()))?;
         Ok(built.scene.as_binding())
     }
 }
@@ -129,6 +136,6 @@ impl Trees {
         });
         let where_they_are = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
         scene[0] = Some(wgpu::TlasInstance::new(&boxes, where_they_are, 0, 0xff));
-        Self { boxes, scene, size }
+        Self { boxes, scene, size, built: false }
     }
 }

@@ -15,6 +15,9 @@ pub use context::{Choice, Context, DeviceInfo, DeviceKind, list_devices, require
 pub use kernels::Access;
 #[cfg(feature = "render")]
 pub use render::{BsdfAnswer, BsdfQuery, GpuStages};
+/// The version of wgpu whose devices and buffers are taken and given here.
+pub use wgpu;
+
 pub use search::{
     DeviceArray, DeviceNearest, DeviceNeighbours, PointSearch, Queries, QueryRadii, SearchTimes, Visitor,
 };

@@ -1,11 +1,13 @@
 //! The search on the GPU against the oracle on the CPU that tests every point.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use glam::Vec3;
 use sunfleck::device::Error;
-use sunfleck::gpu::{Choice, Context, DeviceKind, PointSearch};
-use sunfleck::index::{self, BruteForce, MAX_K, Neighbours, Radii, RadiusSearch};
+use sunfleck::gpu::{Access, Choice, Context, DeviceKind, PointSearch, Queries, QueryRadii, required_limits, wgpu};
+use sunfleck::index::{self, BruteForce, MAX_K, NearestLists, Neighbours, PointBvh, Radii, RadiusSearch};
+use sunfleck::layout::{FANOUT, TreeNode};
 use sunfleck::math::{rng, warp};
 
 /// The device that all tests share; `None` without an adapter.
@@ -161,12 +163,14 @@ fn assert_sets(search: &mut PointSearch) {
     for (name, points) in clouds() {
         search.build(&points).expect("build");
         assert_eq!((search.len(), search.is_empty()), (points.len(), points.is_empty()), "{name}");
-        let (queries, radii) = queries(&points, 200);
-        let one = radii[5];
-        for radii in [Radii::Each(&radii), Radii::One(one), Radii::One(0.0), Radii::One(f32::INFINITY)] {
-            let found = search.neighbours_all(&queries, radii).expect("search");
-            n_differences += assert_same_sets(name, &points, &queries, radii, &found, exact);
-            let counts = search.count_all(&queries, radii).expect("count");
+        let (queries, radii) = queries(&points, 147);
+        let few = &queries[..7];
+        let cases =
+            [(&queries[..], Radii::Each(&radii)), (few, Radii::One(radii[5])), (few, Radii::One(0.0)), (few, ALL)];
+        for (queries, radii) in cases {
+            let found = search.neighbours_all(queries, radii).expect("search");
+            n_differences += assert_same_sets(name, &points, queries, radii, &found, exact);
+            let counts = search.count_all(queries, radii).expect("count");
             let rows: Vec<u32> = found.offsets.windows(2).map(|pair| (pair[1] - pair[0]) as u32).collect();
             assert_eq!(counts, rows, "{name}");
             (n_queries, n_found) = (n_queries + queries.len(), n_found + found.indices.len());
@@ -174,4 +178,438 @@ fn assert_sets(search: &mut PointSearch) {
     }
     println!("{n_queries} queries, {n_found} neighbours, {n_differences} found by one of both alone");
     assert!(n_found > 100 * n_queries);
+}
+
+const ALL: Radii<'static> = Radii::One(f32::INFINITY);
+
+#[track_caller]
+fn assert_same_lists(name: &str, found: &NearestLists, expected: &NearestLists, exact: bool) {
+    assert_eq!(found.k, expected.k);
+    if exact {
+        assert!(found == expected, "{name}, k = {}", found.k);
+        return;
+    }
+    // A point on the sphere may be in or out; nearly equal distances may change places.
+    assert_eq!(found.found.len(), expected.found.len(), "{name}");
+    for q in 0..found.found.len() {
+        let n = found.found[q].min(expected.found[q]) as usize;
+        for at in q * found.k..q * found.k + n {
+            let (ours, theirs) = (found.distances2[at], expected.distances2[at]);
+            assert!((ours - theirs).abs() <= BAND * theirs, "{name}, query {q}: {ours} against {theirs}");
+        }
+    }
+}
+
+#[test]
+fn the_same_nearest_as_on_the_host() {
+    let Some(mut search) = search() else { return };
+    let exact = is_exact(&search);
+    for (name, points) in clouds() {
+        search.build(&points).expect("build");
+        let (queries, radii) = queries(&points, 70);
+        for k in [1, 8, 33, MAX_K] {
+            for radii in [Radii::Each(&radii), ALL] {
+                let found = search.nearest_all(&queries, radii, k).expect("search");
+                let expected = BruteForce(&points).nearest_all(&queries, radii, k).unwrap();
+                assert_same_lists(name, &found, &expected, exact);
+            }
+        }
+    }
+}
+
+/// Memory is used again, whatever it held before; the order of the queries changes nothing.
+#[test]
+fn rebuilt_with_other_sizes() {
+    let Some(mut search) = search() else { return };
+    let exact = is_exact(&search);
+    for n in [1000, 3, 0, 64, 65, 5000, 1, 511, 4097, 8] {
+        let points = uniform(n, n);
+        search.build(&points).expect("build");
+        search.set_sort_queries(n % 2 == 1);
+        let mut indices: Vec<u32> = search.points().expect("points").iter().map(|(_, index)| *index).collect();
+        indices.sort_unstable();
+        assert!(indices.into_iter().eq(0..n), "{n} points: the order is no permutation");
+        let (queries, radii) = queries(&points, 60);
+        let found = search.neighbours_all(&queries, Radii::Each(&radii)).expect("search");
+        assert_same_sets("rebuilt", &points, &queries, Radii::Each(&radii), &found, exact);
+        let lists = search.nearest_all(&queries, Radii::Each(&radii), 5).expect("search");
+        let expected = BruteForce(&points).nearest_all(&queries, Radii::Each(&radii), 5).unwrap();
+        assert_same_lists("rebuilt", &lists, &expected, exact);
+    }
+    for sort in [false, true] {
+        search.set_sort_queries(sort);
+        assert_eq!(search.neighbours_all(&[], ALL).expect("no queries").offsets, [0]);
+        assert!(search.count_all(&[], Radii::Each(&[])).expect("no queries").is_empty());
+        assert!(search.nearest_all(&[], ALL, 3).expect("no queries").found.is_empty());
+    }
+}
+
+/// More queries than one dispatch takes, and more than a block of the prefix sum.
+#[test]
+fn many_queries() {
+    let Some(mut search) = search() else { return };
+    let points = uniform(30, 300);
+    let queries = uniform(31, 150_001);
+    search.build(&points).expect("build");
+    let found = search.neighbours_on_device(Queries::Host(&queries), Radii::One(0.3).into()).expect("search");
+    let offsets = found.offsets.download().expect("offsets");
+    let expected = PointBvh::new(&points).unwrap().count_all(&queries, Radii::One(0.3)).unwrap();
+    let counts: Vec<u32> = offsets.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let n_differences = counts.iter().zip(&expected).filter(|(a, b)| a != b).count();
+    assert!(n_differences == 0 || (!is_exact(&search) && n_differences < 10), "{n_differences} counts differ");
+    assert_eq!((offsets[0], offsets.len(), found.indices.len()), (0, 150_002, offsets[150_001] as usize));
+    let times = search.times().expect("times");
+    assert!(times.build > 0.0 && times.search > 0.0 && times.fill > 0.0, "{times:?}");
+}
+
+fn upload<T: bytemuck::Pod>(context: &Context, data: &[T], usage: wgpu::BufferUsages) -> wgpu::Buffer {
+    let buffer = context.device().create_buffer(&wgpu::BufferDescriptor {
+        label: Some("test"),
+        size: size_of_val(data) as u64,
+        usage: usage | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+        mapped_at_creation: false,
+    });
+    context.queue().write_buffer(&buffer, 0, bytemuck::cast_slice(data));
+    buffer
+}
+
+#[test]
+fn points_and_queries_on_the_device() {
+    let Some(mut search) = search() else { return };
+    let context = search.context().clone();
+    let (points, exact) = (uniform(40, 2000), is_exact(&search));
+    let (queries, radii) = queries(&points, 100);
+    let records: Vec<[f32; 5]> = points.iter().map(|p| [p.x, p.y, p.z, f32::NAN, -1.0]).collect();
+    let on_device = upload(&context, &records, wgpu::BufferUsages::STORAGE);
+    search.build_from(&on_device, points.len() as u32, 5).expect("build");
+    let buffer = upload(&context, &queries, wgpu::BufferUsages::STORAGE);
+    let asked = Queries::Device { buffer: &buffer, n: 100, words_per_record: 3 };
+    let own_radii = upload(&context, &radii, wgpu::BufferUsages::STORAGE);
+    for sort in [false, true] {
+        search.set_sort_queries(sort);
+        for radii_asked in [QueryRadii::Device(&own_radii), Radii::Each(&radii).into()] {
+            let found = search.neighbours_on_device(asked, radii_asked).expect("search").download().expect("rows");
+            assert_same_sets("on the device", &points, &queries, Radii::Each(&radii), &found, exact);
+            let lists = search.nearest_on_device(asked, radii_asked, 7).expect("search").download().expect("lists");
+            let expected = BruteForce(&points).nearest_all(&queries, Radii::Each(&radii), 7).unwrap();
+            assert_same_lists("on the device", &lists, &expected, exact);
+        }
+    }
+    // Nothing is within such radii.
+    let none = upload(&context, &[-1.0f32; 100], wgpu::BufferUsages::STORAGE);
+    let counts = search.count_on_device(asked, QueryRadii::Device(&none)).expect("search");
+    assert_eq!(counts.download().expect("counts"), [0; 100]);
+
+    let refused = |result: Result<(), Error>, part: &str| match result {
+        Err(Error::Buffer { problem, .. }) => assert!(problem.contains(part), "{problem}"),
+        other => panic!("{other:?}"),
+    };
+    refused(search.build_from(&on_device, 2000, 2), "2 words");
+    assert!(search.is_empty());
+    refused(search.build_from(&on_device, 2001, 5), "40000 bytes, 40020 are needed");
+    let plain = upload(&context, &records, wgpu::BufferUsages::UNIFORM);
+    refused(search.build_from(&plain, 10, 5), "STORAGE");
+    let short = upload(&context, &radii[..99], wgpu::BufferUsages::STORAGE);
+    refused(search.count_on_device(asked, QueryRadii::Device(&short)).map(drop), "396 bytes, 400 are needed");
+}
+
+#[test]
+fn what_makes_no_sense_is_refused() {
+    let Some(mut search) = search() else { return };
+    let points = uniform(50, 20);
+    search.build(&points).expect("build");
+    for bad in [f32::NAN, f32::INFINITY] {
+        let expected = |what| index::Error::NotFinite { what, at: 1 };
+        let bad = [Vec3::ZERO, Vec3::new(0.0, bad, 0.0)];
+        assert!(matches!(search.count_all(&bad, ALL), Err(Error::Search(e)) if e == expected("query")));
+        let on_device = search.count_on_device(Queries::Host(&bad), ALL.into());
+        assert!(matches!(on_device, Err(Error::Search(e)) if e == expected("query")));
+        assert!(matches!(search.build(&bad), Err(Error::Search(e)) if e == expected("point")));
+        assert!(search.is_empty());
+    }
+    for radius in [f32::NAN, -1.0, f32::NEG_INFINITY] {
+        let radii = [1.0, radius];
+        for radii in [Radii::One(radius), Radii::Each(&radii)] {
+            let result = search.neighbours_all(&points[..2], radii);
+            assert!(matches!(result, Err(Error::Search(index::Error::Radius { .. }))), "{radius}");
+        }
+    }
+    for k in [0, MAX_K + 1] {
+        assert!(matches!(search.nearest_all(&points, ALL, k), Err(Error::Search(index::Error::K(n))) if n == k));
+    }
+    let result = search.count_all(&points, Radii::Each(&[1.0; 19]));
+    assert!(matches!(result, Err(Error::Search(index::Error::Lengths { queries: 20, radii: 19 }))));
+}
+
+/// What a device cannot hold at once is searched in parts where the rows end on the host, and refused where not.
+#[test]
+fn more_than_fits() {
+    if context().is_none() {
+        return;
+    }
+    let mut context = Context::new(&Choice::Any).expect("a second device");
+    context.set_budget(4 << 20);
+    let mut search = PointSearch::new(Arc::new(context)).expect("kernels");
+    let points = uniform(60, 2000);
+    search.build(&points).expect("within the budget");
+    let (queries, _) = queries(&points, 300);
+    let found = search.neighbours_all(&queries, ALL).expect("in parts");
+    let exact = is_exact(&search);
+    assert_same_sets("in parts", &points, &queries, ALL, &found, exact);
+    assert_eq!(found.indices.len(), 600_000);
+    match search.neighbours_on_device(Queries::Host(&queries), ALL.into()) {
+        Err(Error::TooLarge { needed, allowed, .. }) => assert!((needed, allowed < 4 << 20) == (2_400_000, true)),
+        other => panic!("{:?}", other.map(drop)),
+    }
+    match search.build(&uniform(61, 300_000)) {
+        Err(Error::TooLarge { what, needed, .. }) => {
+            assert!(what.starts_with("points") && needed > 16 * 300_000, "{what}: {needed}");
+        }
+        other => panic!("{other:?}"),
+    }
+    assert!(search.is_empty() && search.count_all(&queries, ALL).expect("no points").iter().all(|n| *n == 0));
+}
+
+/// Sum over the neighbours of 1 − d²/r², and the farthest neighbour.
+const KERNEL_SUM: &str = "
+@group(0) @binding(4) var<storage, read> weights: array<f32>;
+@group(0) @binding(5) var<storage, read_write> sums: array<f32>;
+
+struct Visitor {
+    radius2: f32,
+    inverse: f32,
+    sum: f32,
+}
+
+fn begin(query: u32, centre: vec3<f32>, radius2: f32) -> Visitor {
+    return Visitor(radius2, 1.0 / radius2, 0.0);
+}
+
+fn visit(visitor: ptr<function, Visitor>, slot: u32, delta: vec3<f32>, distance2: f32) {
+    (*visitor).sum += weights[index_of(slot)] * (1.0 - distance2 * (*visitor).inverse);
+}
+
+fn end(visitor: ptr<function, Visitor>, query: u32) {
+    sums[query] = (*visitor).sum;
+}
+";
+
+#[test]
+fn a_visitor_of_ones_own() {
+    let Some(mut search) = search() else { return };
+    let context = search.context().clone();
+    let (points, queries) = (uniform(70, 3000), uniform(71, 200));
+    let weights: Vec<f32> = (0..3000).map(|i| (i % 5) as f32).collect();
+    search.build(&points).expect("build");
+    let visitor = search.compile(KERNEL_SUM, &[Access::Read, Access::Write]).expect("it compiles");
+    let given = upload(&context, &weights, wgpu::BufferUsages::STORAGE);
+    let sums = upload(&context, &[f32::NAN; 200], wgpu::BufferUsages::STORAGE);
+    let radius = 0.4;
+    let expected: Vec<f32> = BruteForce(&points)
+        .fold_all(
+            &queries,
+            Radii::One(radius),
+            |_| 0.0,
+            |sum, i, d2| {
+                *sum += weights[i as usize] * (1.0 - d2 / (radius * radius));
+            },
+        )
+        .unwrap();
+    for sort in [false, true] {
+        search.set_sort_queries(sort);
+        search.visit_all(&visitor, Queries::Host(&queries), Radii::One(radius).into(), &[&given, &sums]).expect("run");
+        let got: Vec<f32> = context.download(&sums, 0, 200).expect("sums");
+        for (got, expected) in got.iter().zip(&expected) {
+            assert!((got - expected).abs() <= 1e-4 * expected.abs().max(1.0), "{got} against {expected}");
+        }
+    }
+    let few = search.visit_all(&visitor, Queries::Host(&queries), ALL.into(), &[&given]);
+    assert!(matches!(few, Err(Error::Shader(_))), "{few:?}");
+    let plain = upload(&context, &weights, wgpu::BufferUsages::UNIFORM);
+    let unbindable = search.visit_all(&visitor, Queries::Host(&queries), ALL.into(), &[&plain, &sums]);
+    assert!(matches!(unbindable, Err(Error::Device { .. })), "{unbindable:?}");
+}
+
+#[test]
+fn what_does_not_compile_is_an_error_with_its_line() {
+    let Some(search) = search() else { return };
+    let line = |text: &str| 1 + KERNEL_SUM[..KERNEL_SUM.find(text).expect("there")].matches('\n').count();
+    for (from, to) in [("* (*visitor).inverse", "* (*visitor).inverted"), ("(*visitor).sum;\n", "vec3(1.0)\n")] {
+        match search.compile(&KERNEL_SUM.replace(from, to), &[Access::Read, Access::Write]) {
+            Err(Error::Shader(message)) => {
+                // The second is missed only where the next line begins.
+                let lines = [line(from), line(from) + 1];
+                assert!(lines.iter().any(|line| message.contains(&format!("wgsl:{line}:"))), "{lines:?}: {message}");
+            }
+            other => panic!("{:?}", other.map(drop)),
+        }
+    }
+    // Right in itself, but not what was said about its buffers, and more buffers than there can be.
+    for accesses in [vec![Access::Read], vec![Access::Read; 1 << 20]] {
+        let result = search.compile(KERNEL_SUM, &accesses).map(drop);
+        assert!(matches!(result, Err(Error::Shader(_))), "{result:?}");
+    }
+}
+
+/// A device that this test has opened itself, with the limits that are asked for; its handler counts what reaches it.
+fn own_device() -> Option<(wgpu::Device, wgpu::Queue, Arc<AtomicUsize>)> {
+    context()?;
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let adapter = pollster::block_on(instance.request_adapter(&Default::default())).ok()?;
+    let descriptor = wgpu::DeviceDescriptor { required_limits: required_limits(), ..Default::default() };
+    let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).expect("a device");
+    let n_errors = Arc::new(AtomicUsize::new(0));
+    let counter = Arc::clone(&n_errors);
+    device.on_uncaptured_error(Arc::new(move |_| {
+        counter.fetch_add(1, Ordering::Relaxed);
+    }));
+    Some((device, queue, n_errors))
+}
+
+#[test]
+fn a_device_of_ones_own() {
+    let Some((device, queue, n_errors)) = own_device() else { return };
+    let context = Arc::new(Context::from_device(device.clone(), queue).expect("enough"));
+    assert_eq!(context.info().name, device.adapter_info().name);
+    let mut search = PointSearch::new(context.clone()).expect("kernels");
+    let (points, exact) = (uniform(80, 1000), is_exact(&search));
+    search.build(&points).expect("build");
+    let (queries, radii) = queries(&points, 100);
+    let found = search.neighbours_all(&queries, Radii::Each(&radii)).expect("search");
+    assert_same_sets("own device", &points, &queries, Radii::Each(&radii), &found, exact);
+
+    // Errors come back here, and only here.
+    assert!(matches!(search.compile("fn begin(", &[]), Err(Error::Shader(_))));
+    let visitor = search.compile(KERNEL_SUM, &[Access::Read, Access::Write]).expect("it compiles");
+    let plain = upload(&context, &radii, wgpu::BufferUsages::UNIFORM);
+    let unbindable = search.visit_all(&visitor, Queries::Host(&queries), ALL.into(), &[&plain, &plain]);
+    assert!(matches!(unbindable, Err(Error::Device { .. })), "{unbindable:?}");
+    search.count_all(&queries, ALL).expect("it goes on");
+    assert_eq!(n_errors.load(Ordering::Relaxed), 0);
+
+    device.destroy();
+    let lost = search.build(&points).and_then(|()| search.count_all(&queries, ALL));
+    assert!(matches!(lost, Err(Error::Device { .. })), "{lost:?}");
+}
+
+#[test]
+fn a_device_of_ones_own_with_too_little() {
+    if context().is_none() {
+        return;
+    }
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let adapter = pollster::block_on(instance.request_adapter(&Default::default())).expect("an adapter");
+    let limits = wgpu::Limits { max_storage_buffers_per_shader_stage: 4, ..wgpu::Limits::downlevel_defaults() };
+    let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
+    let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).expect("a device");
+    match Context::from_device(device, queue) {
+        Err(Error::NoDevice(message)) => assert!(message.contains("4 storage buffers"), "{message}"),
+        other => panic!("{:?}", other.map(drop)),
+    }
+}
+
+/// Steps of a node's child along an axis: low and high.
+fn steps(node: &TreeNode, axis: usize, child: usize) -> [f32; 2] {
+    let words = [node.x, node.y, node.z][axis];
+    [0, 2].map(|first| (words[first + child / 4] >> (8 * (child % 4)) & 255) as f32)
+}
+
+/// What a node says of its children's boxes holds, and is little more than they are.
+#[test]
+fn nodes_hold_their_children_closely() {
+    let Some(mut search) = search() else { return };
+    let mut n_children = 0;
+    for (name, points) in clouds() {
+        search.build(&points).expect("build");
+        let (boxes, nodes) = (search.boxes().expect("boxes"), search.nodes().expect("nodes"));
+        // First box of the level below, of the level, and the number of boxes of each.
+        let (mut below, mut n_below) = (0, points.len().div_ceil(8));
+        let mut nodes = nodes.iter();
+        while n_below > 1 {
+            let n = n_below.div_ceil(FANOUT as usize);
+            for k in 0..n {
+                let (node, parent) = (nodes.next().expect("a node for each box"), &boxes[below + n_below + k]);
+                let children = &boxes[below + 8 * k..below + n_below.min(8 * k + 8)];
+                assert_eq!((node.exponents >> 24) as usize, children.len(), "{name}");
+                for (axis, (i, child)) in (0..3).flat_map(|axis| children.iter().enumerate().map(move |c| (axis, c))) {
+                    let scale = f32::from_bits((node.exponents >> (8 * axis) & 255) << 23);
+                    let [low, high] = steps(node, axis, i).map(|steps| node.origin[axis] + steps * scale);
+                    assert!(low <= child.min[axis] && child.max[axis] <= high, "{name}, node {k}, child {i}");
+                    let extent = f64::from(parent.max[axis]) - f64::from(parent.min[axis]);
+                    // Beside that a rounding of the coordinate, and the least step there is.
+                    let rounding = f64::from(parent.max[axis].abs().max(parent.min[axis].abs()) * f32::EPSILON);
+                    let most = extent / 127.0 + 2.0 * rounding + f64::from(f32::MIN_POSITIVE);
+                    let looseness = [child.min[axis] - low, high - child.max[axis]].map(f64::from);
+                    assert!(looseness.iter().all(|l| *l <= most), "{name}: {looseness:?}, at most {most}");
+                    n_children += 1;
+                }
+            }
+            (below, n_below) = (below + n_below, n);
+        }
+        assert!(nodes.next().is_none(), "{name}: more nodes than boxes above the leaves");
+    }
+    assert!(n_children > 10_000, "{n_children}");
+}
+
+/// Not in the normal run for its memory and time: `cargo test --release --test it gpu_search::large -- --ignored`.
+#[test]
+#[ignore = "some GB and a minute"]
+fn large_sets() {
+    let n = 16_000_000;
+    let queries = uniform(91, 2000);
+    let points = uniform(90, n);
+    let expected = BruteForce(&points).count_all(&queries[..20], Radii::One(0.01)).unwrap();
+    let tree = PointBvh::new(&points).unwrap();
+    let counts = tree.count_all(&queries, Radii::One(0.01)).unwrap();
+    assert_eq!(counts[..20], expected);
+    drop(tree);
+
+    let Some(mut search) = search() else { return };
+    let most = search.max_points().min(n) as usize;
+    search.build(&points[..most]).expect("what one binding holds");
+    let tree = PointBvh::new(&points[..most]).unwrap();
+    let expected = tree.count_all(&queries, Radii::One(0.01)).unwrap();
+    let counts = search.count_all(&queries, Radii::One(0.01)).expect("search");
+    let n_differences = counts.iter().zip(&expected).filter(|(a, b)| a != b).count();
+    println!("{most} points on {}: {n_differences} of 2000 counts differ", search.context().info());
+    assert!(n_differences == 0 || (!is_exact(&search) && n_differences < 10));
+    if most < n as usize {
+        match search.build(&points[..most + 1]) {
+            Err(Error::TooLarge { what, needed, .. }) => {
+                assert_eq!((what.as_str(), needed), ("points in tree order", 16 * (most as u64 + 1)));
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+/// Not a test: `cargo test --release --test it gpu_search::speed -- --ignored --nocapture`.
+#[test]
+#[ignore = "prints times"]
+fn speed() {
+    let Some(mut search) = search() else { return };
+    println!("{}", search.context().info());
+    let points = uniform(92, 200_000);
+    search.build(&points).expect("build");
+    let side = 46;
+    let ordered: Vec<Vec3> = (0..side * side * side)
+        .map(|i| Vec3::new((i % side) as f32, (i / side % side) as f32, (i / side / side) as f32) / 23.0 - 1.0)
+        .collect();
+    let shuffled = uniform(93, side * side * side);
+    // About 6.5 and 52 neighbours each.
+    for (order, queries) in [("in order", &ordered), ("shuffled", &shuffled)] {
+        for sort in [false, true, false, true] {
+            search.set_sort_queries(sort);
+            for radius in [0.04, 0.08] {
+                search.neighbours_all(queries, Radii::One(radius)).expect("search");
+                let times = search.times().expect("times");
+                println!("{order}, sorted first: {sort}, radius {radius}: {times:?}");
+            }
+            for (k, radius) in [(1, f32::INFINITY), (8, 0.08), (8, f32::INFINITY), (64, f32::INFINITY)] {
+                search.nearest_all(queries, Radii::One(radius), k).expect("search");
+                let seconds = search.times().expect("times").search;
+                println!("{order}, sorted first: {sort}, {k} within {radius}: {seconds} s");
+            }
+        }
+    }
 }

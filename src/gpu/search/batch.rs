@@ -54,14 +54,15 @@ impl PointSearch {
         let set = self.sort_if_asked(set)?;
         let counts = self.count(&set)?;
         let (offsets, total) = self.offsets(&counts)?;
-        // Two arrays of this many elements.
-        let most = self.context.most_bytes_new() / 8;
+        // Two arrays of this many elements, the memory they are read through, and some for the queries.
+        let most = (self.context.most_bytes_bound() / 4).min(self.context.budget_left() / 16);
         if u64::from(total) <= most && total != u32::MAX {
             append(all, self.fill(&set, &counts, offsets, total)?.download()?);
             return Ok(());
         }
         drop(offsets);
-        let counts = counts.download()?;
+        let n_each = counts.download()?;
+        drop(counts);
         let mut begin = 0;
         while begin < queries.len() {
             let mut sum = 0;
@@ -70,7 +71,7 @@ impl PointSearch {
                 sum <= most
             };
             // One alone that does not fit is refused.
-            let end = begin + counts[begin..].iter().take_while(fits).count().max(1);
+            let end = begin + n_each[begin..].iter().take_while(fits).count().max(1);
             let part = self.neighbours_on_device(queries[begin..end].into(), radii.part(begin..end).into())?;
             append(all, part.download()?);
             begin = end;
@@ -112,7 +113,7 @@ impl PointSearch {
         let (offsets, total) = self.offsets(&counts)?;
         if total == u32::MAX {
             let total: u64 = counts.download()?.into_iter().map(u64::from).sum();
-            return Err(self.context.too_large("neighbours", 4 * total, self.context.most_bytes_new()));
+            return Err(self.context.too_large("neighbours", 4 * total, self.context.most_bytes_bound()));
         }
         self.fill(&set, &counts, offsets, total)
     }

@@ -28,7 +28,7 @@ use super::kernels::{ACCELERATION_STRUCTURE, Access, Batch, Kernel, Modules, Sha
 use super::timer::Timer;
 use crate::device::Error;
 use crate::index::{self, check_points};
-use crate::layout::PointBox;
+use crate::layout::{PointBox, TreeNode};
 
 /// Words of a point in the order of the tree: position, index.
 const WORDS: u32 = 4;
@@ -173,8 +173,25 @@ impl PointSearch {
         bytes.min(u64::from(u32::MAX - 1)) as u32
     }
 
+    fn clear(&mut self) {
+        self.n_points = 0;
+        self.index.levels.clear();
+    }
+
+    /// Makes room for `n` points; where there is none, what is bound without points is still there.
+    fn reserve_or_keep(&mut self, n: u32) -> Result<(), Error> {
+        let result = self.reserve(n);
+        if result.is_err() {
+            self.reserve(0)?;
+        }
+        result
+    }
+
     fn reserve(&mut self, n: u32) -> Result<(), Error> {
-        self.points.reserve(&self.context, u64::from(n))?;
+        let roomy = (u64::from(n) + u64::from(n / 16)).min(u64::from(self.max_points()));
+        if self.points.capacity() < u64::from(n.max(1)) {
+            self.points.reserve(&self.context, roomy.max(u64::from(n)))?;
+        }
         match &mut self.hardware {
             None => self.index.reserve(&self.context, n),
             Some(hardware) => {
@@ -186,8 +203,9 @@ impl PointSearch {
 
     /// Replaces the points. They must be finite. After an error there are none.
     pub fn build(&mut self, points: &[Vec3]) -> Result<(), Error> {
-        self.n_points = 0;
+        self.clear();
         check_points(points)?;
+        self.reserve_or_keep(points.len() as u32)?;
         self.given.write(&self.context, points)?;
         let records = Records { buffer: self.given.raw().clone(), n: points.len() as u32, words: 3 };
         self.build_records(&records)
@@ -197,7 +215,7 @@ impl PointSearch {
     /// with usage `STORAGE`. It is read before anything submitted later, and not needed afterwards. The positions must be
     /// finite; that is not checked: with one that is not, others may be missed. After an error there are no points.
     pub fn build_from(&mut self, buffer: &wgpu::Buffer, n: u32, words_per_record: u32) -> Result<(), Error> {
-        self.n_points = 0;
+        self.clear();
         if n == u32::MAX {
             return Err(index::Error::TooMany(n as usize).into());
         }
@@ -206,7 +224,7 @@ impl PointSearch {
     }
 
     fn build_records(&mut self, records: &Records) -> Result<(), Error> {
-        self.reserve(records.n)?;
+        self.reserve_or_keep(records.n)?;
         let mut batch = Batch::new(&self.context, &self.shared, "build");
         self.timer.begin(BUILD, &mut batch);
         let n = records.n;
@@ -238,6 +256,15 @@ impl PointSearch {
             return Ok(Vec::new());
         }
         self.readback.read(&self.context, &self.shared, self.index.boxes.raw(), n)
+    }
+
+    /// The nodes of the tree: those of all levels but the leaves', in the order of the boxes.
+    pub fn nodes(&mut self) -> Result<Vec<TreeNode>, Error> {
+        let n = self.index.levels.iter().skip(1).map(|[_, n]| *n as usize).sum();
+        if n == 0 {
+            return Ok(Vec::new());
+        }
+        self.readback.read(&self.context, &self.shared, self.index.nodes.raw(), n)
     }
 
     /// The points in the order of the tree, each with its index.

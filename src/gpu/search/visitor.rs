@@ -19,11 +19,11 @@ impl PointSearch {
     ///
     /// ```wgsl
     /// struct Visitor {
-    ///     radius2: f32,   // set by the search; `visit` may shrink it: points beyond it are passed over from then on
+    ///     radius2: f32,   // points beyond it are passed over: `begin` sets it, `visit` may shrink it
     ///     // … and whatever is to be known of the query
     /// }
-    /// // Before the first neighbour; `query` is the caller's index.
-    /// fn begin(query: u32, centre: vec3<f32>, radius: f32) -> Visitor
+    /// // Before the first neighbour; `query` is the caller's index, `radius2` the square of its radius.
+    /// fn begin(query: u32, centre: vec3<f32>, radius2: f32) -> Visitor
     /// // Once for each point within the radius; `delta` leads from the centre to it, `distance2` is its square.
     /// fn visit(visitor: ptr<function, Visitor>, slot: u32, delta: vec3<f32>, distance2: f32)
     /// // After the last.
