@@ -48,7 +48,8 @@ fn begin(query: u32, centre: vec3<f32>, radius2: f32) -> Visitor {
     var visitor: Visitor;
     visitor.radius2 = radius2;
     visitor.row = query * k;
-    if n_points == 0u {
+    // Without a tree of our own the order of the points is not known either.
+    if n_points == 0u || arguments.further.y == 0u {
         return visitor;
     }
     let rank = rank_of(centre, n_points, arguments.further.y);

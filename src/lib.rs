@@ -20,3 +20,8 @@ pub mod points;
 pub mod ppm;
 #[cfg(feature = "render")]
 pub mod scene;
+
+// Its Rust is compiled and run with the documentation tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

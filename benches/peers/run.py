@@ -16,13 +16,13 @@ HERE = pathlib.Path(__file__).resolve().parent
 OUT = HERE.parents[1] / "target" / "peers"
 
 # Library: what runs it, and where its version is said if it does not say it itself.
-RUST = ["sunfleck", "sunfleck-single", "kiddo", "obvhs-ploc", "obvhs-medium", "rstar"]
+RUST = ["sunfleck", "sunfleck-single", "sunfleck-grid", "kiddo", "obvhs-ploc", "obvhs-medium", "rstar"]
 CPP = ["embree", "flann", "nanoflann"]
 LIBRARIES = RUST + CPP + ["scipy"]
 TITLES = {
     "sunfleck": "Sunfleck, `PointBvh`, batch",
     "sunfleck-single": "Sunfleck, `PointBvh`, query by query",
-    "sunfleck-grid": "Sunfleck, `Grid`, sorted queries (the bar)",
+    "sunfleck-grid": "Sunfleck, `HashGrid`, sorted queries",
     "kiddo": "kiddo, `ImmutableKdTree`",
     "obvhs-ploc": "obvhs, PLOC, boxes grown by r",
     "obvhs-medium": "obvhs, medium quality, boxes grown by r",
@@ -36,7 +36,7 @@ RADII = ["0.005", "0.01", "0.02", "0.05"]
 KS = [1, 4, 8]
 KNN_RADIUS = "0.02"
 # Queries of the first round; all libraries give their sums of these.
-WARM_UP = 16384
+WARM_UP = 4096
 # Neighbours at the very edge of the ball may fall on either side: fused multiply-add, or double precision.
 TOLERANCE = 2e-5
 
@@ -100,10 +100,13 @@ def build(wanted, portable):
     # Also the generator of the points: without it there is nothing to do.
     subprocess.run(["cargo", "build", "--release", *manifest], env=env, check=True)
     metadata = subprocess.run(["cargo", "metadata", "--format-version=1", *manifest], check=True, capture_output=True)
+    head = subprocess.run(["git", "-C", str(HERE), "rev-parse", "--short", "HEAD"], capture_output=True, text=True)
     crates = {package["name"]: package["version"] for package in json.loads(metadata.stdout)["packages"]}
     for library in RUST:
         programs[library] = [str(rust_out / "release" / "sunfleck-peers"), "run", library]
         versions[library] = crates[library.split("-")[0]]
+        if library.startswith("sunfleck") and head.returncode == 0:
+            versions[library] += f" ({head.stdout.strip()})"
     arch = "ARCH=" if portable else "ARCH=-march=native"
     for library in [c for c in CPP if c in wanted]:
         program = cpp_out / library

@@ -118,11 +118,15 @@ impl Stages for CpuStages {
 
     fn gather(&mut self, frame: &Frame) -> Result<(), Error> {
         let start = Instant::now();
-        let (scene, tree, photons) = (&*self.scene, &self.tree, &self.photons);
-        self.radiance.par_iter_mut().with_min_len(256).zip(&self.vertices).zip(&self.first_radii).for_each(
-            |((out, vertex), first)| {
-                *out = gather::gather(scene, tree, photons, frame, vertex, first * frame.radius_scale).to_array();
-            },
+        gather::gather(
+            &self.scene,
+            &self.tree,
+            &self.photons,
+            frame,
+            self.width as usize,
+            &self.vertices,
+            &self.first_radii,
+            &mut self.radiance,
         );
         self.times.gather = start.elapsed().as_secs_f64();
         Ok(())

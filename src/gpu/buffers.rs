@@ -25,6 +25,12 @@ impl Array {
         Self { what, stride: size_of::<T>() as u64, usage, whole: true, buffer: None }
     }
 
+    /// Empty; boxes of two corners each, over which the device can build its tree.
+    pub(super) fn of_boxes(what: &'static str) -> Self {
+        let array = Self::new::<[f32; 6]>(what);
+        Self { usage: array.usage | wgpu::BufferUsages::BLAS_INPUT, ..array }
+    }
+
     /// Empty; shaders see a range of it at a time.
     #[cfg(feature = "render")]
     pub(super) fn in_ranges<T>(what: &'static str) -> Self {

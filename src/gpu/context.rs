@@ -47,10 +47,12 @@ pub struct DeviceInfo {
     pub kind: DeviceKind,
     /// Driver and its version.
     pub driver: String,
+    /// Whether it has ray queries, for [`Context::with_ray_queries`].
+    pub ray_queries: bool,
 }
 
 impl DeviceInfo {
-    fn new(index: usize, info: wgpu::AdapterInfo) -> Self {
+    fn new(index: usize, info: wgpu::AdapterInfo, features: wgpu::Features) -> Self {
         let kind = match info.device_type {
             wgpu::DeviceType::DiscreteGpu => DeviceKind::Discrete,
             wgpu::DeviceType::IntegratedGpu => DeviceKind::Integrated,
@@ -59,7 +61,8 @@ impl DeviceInfo {
             wgpu::DeviceType::Other => DeviceKind::Other,
         };
         let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
-        Self { index, name: info.name, backend: info.backend.to_string(), kind, driver }
+        let ray_queries = features.contains(RAY_QUERIES);
+        Self { index, name: info.name, backend: info.backend.to_string(), kind, driver, ray_queries }
     }
 
     /// Whether this is hardware.
@@ -73,6 +76,9 @@ impl std::fmt::Display for DeviceInfo {
         write!(f, "{} ({}, {}", self.name, self.backend, self.kind)?;
         if !self.driver.is_empty() {
             write!(f, ", {}", self.driver)?;
+        }
+        if self.ray_queries {
+            f.write_str(", ray queries")?;
         }
         f.write_str(")")
     }
@@ -106,9 +112,13 @@ fn adapters() -> Vec<(DeviceInfo, wgpu::Adapter)> {
         found = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::SECONDARY));
         found.retain(can_compute);
     }
-    let describe = |(index, adapter): (usize, wgpu::Adapter)| (DeviceInfo::new(index, adapter.get_info()), adapter);
+    let describe = |(index, adapter): (usize, wgpu::Adapter)| {
+        (DeviceInfo::new(index, adapter.get_info(), adapter.features()), adapter)
+    };
     found.into_iter().enumerate().map(describe).collect()
 }
+
+const RAY_QUERIES: wgpu::Features = wgpu::Features::EXPERIMENTAL_RAY_QUERY;
 
 fn can_compute(adapter: &wgpu::Adapter) -> bool {
     adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
@@ -178,7 +188,24 @@ pub struct Context {
 impl Context {
     /// Opens a device.
     pub fn new(choice: &Choice) -> Result<Self, Error> {
+        Self::choose(choice, false)
+    }
+
+    /// Opens a device, of those that have ray queries, with that feature: [`super::Method::Hardware`] needs it. It is
+    /// experimental in wgpu, which says that it may have unsound bugs, so that it is only asked for here
+    /// (docs/adr/0007-ray-queries.md).
+    pub fn with_ray_queries(choice: &Choice) -> Result<Self, Error> {
+        Self::choose(choice, true)
+    }
+
+    fn choose(choice: &Choice, ray_queries: bool) -> Result<Self, Error> {
         let mut found = adapters();
+        let n_all = found.len();
+        found.retain(|(info, _)| info.ray_queries || !ray_queries);
+        if found.is_empty() && n_all > 0 {
+            return Err(Error::NoDevice(format!("none of {n_all} GPU adapters has ray queries")));
+        }
+        let kind = if ray_queries { " with ray queries" } else { "" };
         let list = || {
             let names: Vec<String> = list_devices().iter().map(|d| format!("{}: {d}", d.index)).collect();
             if names.is_empty() { "there is none".to_owned() } else { format!("there are {}", names.join("; ")) }
@@ -193,25 +220,31 @@ impl Context {
         };
         let Some((info, adapter)) = found.into_iter().find(|(info, _)| wanted(info)) else {
             return Err(Error::NoDevice(match choice {
-                Choice::Real => format!("no hardware GPU; {}", list()),
+                Choice::Real => format!("no hardware GPU{kind}; {}", list()),
                 Choice::Any => {
                     "no GPU adapter: no driver, or none with compute shaders (--backend cpu needs none)".to_owned()
                 }
-                Choice::Index(index) => format!("no GPU adapter {index}; {}", list()),
-                Choice::Name(part) => format!("no GPU adapter named \"{part}\"; {}", list()),
+                Choice::Index(index) => format!("no GPU adapter {index}{kind}; {}", list()),
+                Choice::Name(part) => format!("no GPU adapter named \"{part}\"{kind}; {}", list()),
             }));
         };
-        Self::open(info, &adapter)
+        Self::open(info, &adapter, ray_queries)
     }
 
-    fn open(info: DeviceInfo, adapter: &wgpu::Adapter) -> Result<Self, Error> {
+    fn open(info: DeviceInfo, adapter: &wgpu::Adapter, ray_queries: bool) -> Result<Self, Error> {
         let limits = adapter.limits();
         check_limits(&info, &limits, RENDER_BUFFERS)?;
-        let features = adapter.features() & TIMESTAMPS;
+        let mut features = adapter.features() & TIMESTAMPS;
+        let mut experimental_features = wgpu::ExperimentalFeatures::disabled();
+        if ray_queries {
+            features |= RAY_QUERIES;
+            experimental_features = experimental();
+        }
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("sunfleck"),
             required_features: features,
             required_limits: limits.clone(),
+            experimental_features,
             ..Default::default()
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
@@ -239,9 +272,10 @@ impl Context {
     /// recorded here is caught by error scopes and returned, and only an error that wgpu raises on another thread goes to
     /// the caller's handler (or, without one, wgpu panics). The loss of the device is told to the caller's callback;
     /// here it shows as an error of whatever is read back next. Times are measured by timestamps if the device was opened
-    /// with `TIMESTAMP_QUERY` and `TIMESTAMP_QUERY_INSIDE_ENCODERS`, else by waiting.
+    /// with `TIMESTAMP_QUERY` and `TIMESTAMP_QUERY_INSIDE_ENCODERS`, else by waiting; ray queries can be used if it was
+    /// opened with `EXPERIMENTAL_RAY_QUERY` and the adapter's limits for them.
     pub fn from_device(device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, Error> {
-        let info = DeviceInfo::new(usize::MAX, device.adapter_info());
+        let info = DeviceInfo::new(usize::MAX, device.adapter_info(), device.features());
         check_limits(&info, &device.limits(), SEARCH_BUFFERS)?;
         Ok(Self::with(device, queue, info, Arc::default()))
     }
@@ -274,6 +308,11 @@ impl Context {
     /// What the device is.
     pub fn info(&self) -> &DeviceInfo {
         &self.info
+    }
+
+    /// Whether the device was opened with ray queries.
+    pub fn ray_queries(&self) -> bool {
+        self.device.features().contains(RAY_QUERIES)
     }
 
     /// Most bytes of one array that a shader can see.
@@ -421,6 +460,14 @@ impl Drop for Buffer {
     fn drop(&mut self) {
         self.used.fetch_sub(self.raw.size(), Ordering::Relaxed);
     }
+}
+
+/// What wgpu wants to hear before it gives a feature that it calls experimental.
+#[allow(unsafe_code, reason = "docs/adr/0007-ray-queries.md")]
+fn experimental() -> wgpu::ExperimentalFeatures {
+    // SAFETY: nothing to uphold; the call says that such features may have unsound bugs, which are wgpu's to mend and
+    // ours to report. The user has asked for them.
+    unsafe { wgpu::ExperimentalFeatures::enabled() }
 }
 
 /// Half of the memory that is free, where the system says, else 4 GiB.

@@ -52,7 +52,7 @@ pub(super) struct Index {
     tree_leaves: Arc<Kernel>,
     tree_level: Arc<Kernel>,
     blocks: Array,
-    bounds: Array,
+    pub(super) bounds: Array,
     keys: [Array; 2],
     order: [Array; 2],
     counts: Array,

@@ -99,6 +99,16 @@ pub(super) fn storage(access: Access) -> wgpu::BindingType {
     }
 }
 
+impl From<Access> for wgpu::BindingType {
+    fn from(access: Access) -> Self {
+        storage(access)
+    }
+}
+
+/// What ray queries search.
+pub(super) const ACCELERATION_STRUCTURE: wgpu::BindingType =
+    wgpu::BindingType::AccelerationStructure { vertex_return: false };
+
 /// What all kernels share. Bind group 0 is a kernel's own, 1 holds the arguments of the dispatch, those after it are the
 /// user's: a kernel sees them if its text names `@group(2)`, or `@group(3)`.
 pub(super) struct Shared {
@@ -137,27 +147,31 @@ impl<'a> Modules<'a> {
         Self { context, shared }
     }
 
-    /// The entry point `name` of `module`, whose storage buffers are used as `accesses` says, in the order of their
-    /// bindings.
+    /// The entry point `name` of `module`; `bindings` are those of its group 0, storage buffers by their [`Access`].
     pub(super) fn kernel(
         &self,
         module: &'static str,
         name: &'static str,
-        accesses: &[Access],
+        bindings: &[impl Copy + Into<wgpu::BindingType>],
     ) -> Result<Arc<Kernel>, Error> {
         let mut known = self.context.kernels.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if let Some(kernel) = known.get(&(module, name)) {
             return Ok(Arc::clone(kernel));
         }
-        let built = self.build(module, shaders::source(module), name, accesses, false);
+        let built = self.build(module, shaders::source(module), name, bindings, false);
         let kernel = Arc::new(built.map_err(|error| self.context.error(format!("{module}.wgsl: {error}")))?);
         known.insert((module, name), Arc::clone(&kernel));
         Ok(kernel)
     }
 
     /// The entry point `name` of a text from outside this crate; what is wrong with it is an error that names the line.
-    pub(super) fn custom(&self, source: String, name: &'static str, accesses: &[Access]) -> Result<Kernel, Error> {
-        self.build("custom", source, name, accesses, true).map_err(|error| Error::Shader(error.to_string()))
+    pub(super) fn custom(
+        &self,
+        source: String,
+        name: &'static str,
+        bindings: &[impl Copy + Into<wgpu::BindingType>],
+    ) -> Result<Kernel, Error> {
+        self.build("custom", source, name, bindings, true).map_err(|error| Error::Shader(error.to_string()))
     }
 
     fn build(
@@ -165,7 +179,7 @@ impl<'a> Modules<'a> {
         module: &str,
         source: String,
         name: &'static str,
-        accesses: &[Access],
+        bindings: &[impl Copy + Into<wgpu::BindingType>],
         zero_workgroup_memory: bool,
     ) -> Result<Kernel, wgpu::Error> {
         let device = &self.context.device;
@@ -176,11 +190,11 @@ impl<'a> Modules<'a> {
                 source: wgpu::ShaderSource::Wgsl(source.into()),
             });
             let entries: Vec<_> = (0..)
-                .zip(accesses)
-                .map(|(binding, &access)| wgpu::BindGroupLayoutEntry {
+                .zip(bindings)
+                .map(|(binding, &ty)| wgpu::BindGroupLayoutEntry {
                     binding,
                     visibility: wgpu::ShaderStages::COMPUTE,
-                    ty: storage(access),
+                    ty: ty.into(),
                     count: None,
                 })
                 .collect();

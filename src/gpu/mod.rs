@@ -2,6 +2,7 @@
 
 mod buffers;
 mod context;
+mod hardware;
 mod index;
 mod kernels;
 #[cfg(feature = "render")]
@@ -20,3 +21,22 @@ pub use wgpu;
 pub use search::{
     DeviceArray, DeviceNearest, DeviceNeighbours, PointSearch, Queries, QueryRadii, SearchTimes, Visitor,
 };
+
+/// How neighbours are found on the GPU.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// By a walk of our own through a tree of tight boxes, which serves any radius: on every adapter.
+    #[default]
+    Tree,
+    /// By the adapter's ray queries over boxes as wide as the largest radius ([`Context::with_ray_queries`]).
+    Hardware,
+}
+
+impl std::fmt::Display for Method {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Tree => "tree",
+            Self::Hardware => "hardware",
+        })
+    }
+}

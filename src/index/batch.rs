@@ -101,6 +101,22 @@ pub struct NearestLists {
     pub distances2: Vec<f32>,
 }
 
+impl NearestLists {
+    /// For as many queries, which are checked, none found yet.
+    pub(super) fn none(queries: &[Vec3], radii: Radii<'_>, built: f32, k: usize) -> Result<Self, Error> {
+        if !(1..=MAX_K).contains(&k) {
+            return Err(Error::K(k));
+        }
+        radii.check(queries, built)?;
+        Ok(Self {
+            k,
+            found: vec![0; queries.len()],
+            indices: vec![Neighbour::NONE.index; queries.len() * k],
+            distances2: vec![Neighbour::NONE.distance2; queries.len() * k],
+        })
+    }
+}
+
 pub(super) fn fold_each<S: RadiusSearch, T: Send>(
     index: &S,
     queries: &[Vec3],
@@ -157,16 +173,7 @@ pub(super) fn nearest<S: RadiusSearch>(
     radii: Radii<'_>,
     k: usize,
 ) -> Result<NearestLists, Error> {
-    if !(1..=MAX_K).contains(&k) {
-        return Err(Error::K(k));
-    }
-    radii.check(queries, index.max_radius())?;
-    let mut lists = NearestLists {
-        k,
-        found: vec![0; queries.len()],
-        indices: vec![Neighbour::NONE.index; queries.len() * k],
-        distances2: vec![Neighbour::NONE.distance2; queries.len() * k],
-    };
+    let mut lists = NearestLists::none(queries, radii, index.max_radius(), k)?;
     let rows = lists.indices.par_chunks_mut(k).zip(lists.distances2.par_chunks_mut(k)).zip(&mut lists.found);
     rows.zip(queries).enumerate().with_min_len(GRAIN).for_each_init(
         || Nearest::new(k),

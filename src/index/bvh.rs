@@ -9,40 +9,45 @@ use std::ops::ControlFlow;
 
 use glam::Vec3;
 use rayon::prelude::*;
-use wide::f32x8;
 
-use super::{Error, FANOUT, LEAF_SIZE, Nearest, RadiusSearch, check_points};
+use super::lanes::{Eight, WIDTH};
+use super::{Error, FANOUT, LEAF_SIZE, Nearest, NearestLists, Radii, RadiusSearch, check_points, packet, radix, walk};
 use crate::math::morton;
 
-const WIDTH: usize = FANOUT as usize;
-const _: () = assert!(LEAF_SIZE == FANOUT);
-/// 8^11 > 2^32.
-const MAX_LEVELS: usize = 11;
+const _: () = assert!(LEAF_SIZE == FANOUT && FANOUT as usize == WIDTH);
+/// Bits of a Morton key that are sorted by only where the others agree.
+const LOWER: u32 = 31;
 /// No box is nearer than this to anything: padding of incomplete groups.
 const FAR: f32 = f32::INFINITY;
 
-/// Eight boxes, or with min = max eight points, component by component.
+/// Eight boxes, component by component.
 #[derive(Clone, Copy, Debug)]
-struct Octet {
-    min: [f32x8; 3],
-    max: [f32x8; 3],
+pub(super) struct Octet {
+    pub(super) min: [Eight; 3],
+    pub(super) max: [Eight; 3],
 }
 
 /// Eight points, component by component.
 #[derive(Clone, Copy, Debug)]
-struct Points([f32x8; 3]);
+pub(super) struct Points(pub(super) [Eight; 3]);
 
 /// See the module.
 #[derive(Clone, Debug, Default)]
 pub struct PointBvh {
-    /// Index of the point in each slot.
-    order: Vec<u32>,
-    leaves: Vec<Points>,
+    /// Number of points.
+    n: usize,
+    /// Index of the point in each slot, padded to whole leaves.
+    pub(super) order: Vec<u32>,
+    pub(super) leaves: Vec<Points>,
     /// Boxes of level 0 first; each level padded to whole octets.
-    boxes: Vec<Octet>,
+    pub(super) boxes: Vec<Octet>,
     /// First octet of each level.
-    levels: Vec<u32>,
-    keys: Vec<(u64, u32)>,
+    pub(super) levels: Vec<u32>,
+    /// What is sorted, and room for it.
+    words: Vec<u64>,
+    other: Vec<u64>,
+    /// Boxes of the level that is built.
+    bounds: Vec<(Vec3, Vec3)>,
 }
 
 impl PointBvh {
@@ -57,6 +62,7 @@ impl PointBvh {
     /// Over `n` other points, reusing the memory. They must be finite.
     pub fn rebuild(&mut self, n: usize, point: impl Fn(usize) -> Vec3 + Sync) {
         assert!(n < u32::MAX as usize, "more points than 32 bits count");
+        self.n = n;
         self.sort(n, &point);
         let at = |slot: usize| if slot < n { point(self.order[slot] as usize) } else { Vec3::splat(FAR) };
         let n_leaves = n.div_ceil(WIDTH);
@@ -65,7 +71,7 @@ impl PointBvh {
             .with_min_len(1024)
             .map(|leaf| {
                 let p: [Vec3; WIDTH] = std::array::from_fn(|i| at(leaf * WIDTH + i));
-                Points(std::array::from_fn(|axis| f32x8::from(p.map(|p| p[axis]))))
+                Points(std::array::from_fn(|axis| Eight(p.map(|p| p[axis]))))
             })
             .collect_into_vec(&mut self.leaves);
         self.levels.clear();
@@ -73,20 +79,23 @@ impl PointBvh {
         if n == 0 {
             return;
         }
-        let mut bounds: Vec<(Vec3, Vec3)> = self
-            .leaves
+        self.leaves
             .par_iter()
             .with_min_len(1024)
             .enumerate()
             .map(|(leaf, points)| points.bounds((n - leaf * WIDTH).min(WIDTH)))
-            .collect();
+            .collect_into_vec(&mut self.bounds);
         loop {
             self.levels.push(self.boxes.len() as u32);
-            self.boxes.extend(bounds.chunks(WIDTH).map(Octet::of));
-            if bounds.len() == 1 {
+            self.boxes.extend(self.bounds.chunks(WIDTH).map(Octet::of));
+            let above = self.bounds.len().div_ceil(WIDTH);
+            if self.bounds.len() == 1 {
                 break;
             }
-            bounds = bounds.chunks(WIDTH).map(union).collect();
+            for k in 0..above {
+                self.bounds[k] = union(&self.bounds[k * WIDTH..((k + 1) * WIDTH).min(self.bounds.len())]);
+            }
+            self.bounds.truncate(above);
         }
     }
 
@@ -99,32 +108,37 @@ impl PointBvh {
             .fold(|| nothing, |(min, max), i| (min.min(point(i)), max.max(point(i))))
             .reduce(|| nothing, |a, b| (a.0.min(b.0), a.1.max(b.1)));
         let scale = (max - min).map(|extent| if extent > 0.0 { morton::CELLS / extent } else { 0.0 });
-        (0..n)
-            .into_par_iter()
-            .with_min_len(8192)
-            .map(|i| {
-                let cell = ((point(i) - min) * scale).min(Vec3::splat(morton::CELLS - 1.0)).as_uvec3();
-                (morton::interleave(cell.to_array()), i as u32)
-            })
-            .collect_into_vec(&mut self.keys);
-        self.keys.par_sort_unstable();
-        self.keys.par_iter().with_min_len(8192).map(|k| k.1).collect_into_vec(&mut self.order);
+        let key = |i: usize| {
+            let cell = ((point(i) - min) * scale).min(Vec3::splat(morton::CELLS - 1.0)).as_uvec3();
+            morton::interleave(cell.to_array())
+        };
+        // The upper half of each key before the index; the few that agree in it are sorted by the whole key.
+        let word = |i: usize| key(i) >> LOWER << 32 | i as u64;
+        (0..n).into_par_iter().with_min_len(8192).map(word).collect_into_vec(&mut self.words);
+        self.other.resize(n, 0);
+        radix::sort(&mut self.words, &mut self.other, 32, 63 - LOWER);
+        let whole = |&word: &u64| key(word as u32 as usize);
+        for run in self.words.chunk_by_mut(|a, b| a >> 32 == b >> 32) {
+            if run.len() < 20 { run.sort_by_key(whole) } else { run.sort_by_cached_key(whole) }
+        }
+        self.words.par_iter().with_min_len(8192).map(|&word| word as u32).collect_into_vec(&mut self.order);
+        self.order.resize(n.next_multiple_of(WIDTH), u32::MAX);
     }
 
     /// Index of the point in each slot: slots are what [`PointBvh::visit`] reports.
     pub fn order(&self) -> &[u32] {
-        &self.order
+        &self.order[..self.n]
     }
 
     /// The boxes (least and largest corner) of all levels, level 0 first, without padding: what the GPU builds.
     pub fn boxes(&self) -> Vec<(Vec3, Vec3)> {
         let mut boxes = Vec::new();
-        let mut n = self.order.len();
+        let mut n = self.n;
         for &first in &self.levels {
             n = n.div_ceil(WIDTH);
             boxes.extend((0..n).map(|k| {
                 let o = &self.boxes[first as usize + k / WIDTH];
-                let corner = |c: [f32x8; 3]| Vec3::from_array(c.map(|c| c.to_array()[k % WIDTH]));
+                let corner = |c: [Eight; 3]| Vec3::from_array(c.map(|c| c.0[k % WIDTH]));
                 (corner(o.min), corner(o.max))
             }));
         }
@@ -135,72 +149,28 @@ impl PointBvh {
     /// slots.
     #[inline]
     pub fn visit(&self, centre: Vec3, radius: f32, mut visit: impl FnMut(u32, f32)) {
-        let _: ControlFlow<()> = self.walk(
-            centre,
-            &mut squared(radius),
-            |r2| *r2,
-            |_, slot, d2| {
-                visit(slot, d2);
-                ControlFlow::Continue(())
-            },
-        );
+        let _: ControlFlow<()> = walk::ball(self, centre, radius, true, |slot, d2| {
+            visit(slot, d2);
+            ControlFlow::Continue(())
+        });
     }
 
-    /// Depth first; `bound` of the state may shrink as `visit` changes it.
+    /// For each i below `n` the points around `query(i)`, a centre and a radius, in order of the slots:
+    /// `visit(i, slots, squared distances)`, as often as needed. It pays when successive queries are close to each other.
     #[inline]
-    fn walk<S, B>(
+    pub fn visit_packets(
         &self,
-        centre: Vec3,
-        state: &mut S,
-        bound: impl Fn(&S) -> f32,
-        mut visit: impl FnMut(&mut S, u32, f32) -> ControlFlow<B>,
-    ) -> ControlFlow<B> {
-        let Some(top) = self.levels.len().checked_sub(1) else { return ControlFlow::Continue(()) };
-        let c = [f32x8::splat(centre.x), f32x8::splat(centre.y), f32x8::splat(centre.z)];
-        // Children of each level that are still to be entered: octet and bits.
-        let mut pending = [(0u32, 0u32); MAX_LEVELS];
-        let mut level = top;
-        pending[top] = (0, self.boxes[self.levels[top] as usize].within(&c, bound(state)));
-        loop {
-            let (octet, bits) = pending[level];
-            if bits == 0 {
-                if level == top {
-                    return ControlFlow::Continue(());
-                }
-                level += 1;
-                continue;
-            }
-            let child = octet * FANOUT + bits.trailing_zeros();
-            pending[level].1 = bits & (bits - 1);
-            if level > 0 {
-                level -= 1;
-                let octet = &self.boxes[(self.levels[level] + child) as usize];
-                pending[level] = (child, octet.within(&c, bound(state)));
-                continue;
-            }
-            let d2 = self.leaves[child as usize].distance2(&c);
-            let mut inside = d2.simd_le(f32x8::splat(bound(state))).to_bitmask();
-            if inside == 0 {
-                continue;
-            }
-            let d2 = d2.to_array();
-            while inside != 0 {
-                let i = inside.trailing_zeros();
-                inside &= inside - 1;
-                visit(state, child * LEAF_SIZE + i, d2[i as usize])?;
-            }
-        }
+        n: usize,
+        query: impl Fn(usize) -> (Vec3, f32),
+        visit: impl FnMut(usize, &[u32], &[f32]),
+    ) {
+        packet::visit(self, n, true, query, visit);
     }
-}
-
-/// Padding lies at infinity: no bound reaches it.
-fn squared(radius: f32) -> f32 {
-    (radius * radius).min(f32::MAX)
 }
 
 impl RadiusSearch for PointBvh {
     fn len(&self) -> usize {
-        self.order.len()
+        self.n
     }
 
     #[inline]
@@ -208,23 +178,27 @@ impl RadiusSearch for PointBvh {
         &self,
         centre: Vec3,
         radius: f32,
-        mut visit: impl FnMut(u32, f32) -> ControlFlow<B>,
+        visit: impl FnMut(u32, f32) -> ControlFlow<B>,
     ) -> ControlFlow<B> {
-        self.walk(centre, &mut squared(radius), |r2| *r2, |_, slot, d2| visit(self.order[slot as usize], d2))
+        walk::ball(self, centre, radius, false, visit)
     }
 
     fn nearest(&self, centre: Vec3, radius: f32, nearest: &mut Nearest) {
-        nearest.clear();
-        let radius2 = squared(radius);
-        let _: ControlFlow<()> = self.walk(
-            centre,
-            nearest,
-            |nearest| nearest.bound().min(radius2),
-            |nearest, slot, d2| {
-                nearest.insert(self.order[slot as usize], d2);
-                ControlFlow::Continue(())
-            },
-        );
+        walk::nearest(self, 1, |_| (centre, radius), nearest, |_, _| ());
+    }
+
+    fn fold_all<T: Send>(
+        &self,
+        queries: &[Vec3],
+        radii: Radii<'_>,
+        start: impl Fn(usize) -> T + Sync,
+        visit: impl Fn(&mut T, u32, f32) + Sync,
+    ) -> Result<Vec<T>, Error> {
+        packet::fold_all(self, queries, radii, start, visit)
+    }
+
+    fn nearest_all(&self, queries: &[Vec3], radii: Radii<'_>, k: usize) -> Result<NearestLists, Error> {
+        packet::nearest_all(self, queries, radii, k)
     }
 }
 
@@ -237,29 +211,15 @@ impl Octet {
         let at = |i: usize| boxes.get(i).copied().unwrap_or((Vec3::splat(FAR), Vec3::splat(FAR)));
         let b: [(Vec3, Vec3); WIDTH] = std::array::from_fn(at);
         Self {
-            min: std::array::from_fn(|axis| f32x8::from(b.map(|b| b.0[axis]))),
-            max: std::array::from_fn(|axis| f32x8::from(b.map(|b| b.1[axis]))),
+            min: std::array::from_fn(|axis| Eight(b.map(|b| b.0[axis]))),
+            max: std::array::from_fn(|axis| Eight(b.map(|b| b.1[axis]))),
         }
-    }
-
-    /// Bit i: box i comes within √bound of the centre.
-    #[inline]
-    fn within(&self, c: &[f32x8; 3], bound: f32) -> u32 {
-        let outside = |axis: usize| (self.min[axis] - c[axis]).fast_max(c[axis] - self.max[axis]).fast_max(f32x8::ZERO);
-        let (x, y, z) = (outside(0), outside(1), outside(2));
-        (x * x + y * y + z * z).simd_le(f32x8::splat(bound)).to_bitmask()
     }
 }
 
 impl Points {
-    #[inline]
-    fn distance2(&self, c: &[f32x8; 3]) -> f32x8 {
-        let (x, y, z) = (self.0[0] - c[0], self.0[1] - c[1], self.0[2] - c[2]);
-        x * x + y * y + z * z
-    }
-
     fn bounds(&self, n: usize) -> (Vec3, Vec3) {
-        let [x, y, z] = self.0.map(|c| c.to_array());
+        let [x, y, z] = self.0.map(|c| c.0);
         (0..n)
             .map(|i| Vec3::new(x[i], y[i], z[i]))
             .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |a, p| (a.0.min(p), a.1.max(p)))

@@ -10,8 +10,9 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::batch::{GRAIN, fold_each};
-use super::blocks::{Blocks, Splat, bounds, reach, splat};
+use super::batch::fold_each;
+use super::blocks::{self, Blocks, Hits, Splat, Walk, bounds, reach, splat};
+use super::lanes::Lanes;
 use super::stats::{CountVisits, Tally, Visits};
 use super::{Error, Nearest, Radii, RadiusSearch, check_points, check_radius, radius2};
 
@@ -29,8 +30,10 @@ const LONGEST: f32 = 1e37;
 const MAX_BRICKS: usize = 1 << 23;
 /// Fewer queries are not worth sorting.
 const FEW: usize = 4096;
+/// Queries that are sorted together, by one thread: at most.
+const MANY: usize = 1 << 18;
 
-/// Whether a batch is sorted by cell before it is answered.
+/// Whether a batch is sorted, by bricks of cells, before it is answered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum QueryOrder {
     /// Sorted where neighbours in the slice are not neighbours in space.
@@ -127,46 +130,17 @@ impl HashGrid {
         self.slots = slots;
     }
 
-    /// Visits what is within the reach, nearest rows of cells first; `bound` of the state may shrink as `visit` changes it.
-    #[inline]
-    fn walk<S, B>(
+    #[inline(always)]
+    fn scan_row<L: Lanes, S, B>(
         &self,
-        centre: Vec3,
-        radius: f32,
-        state: &mut S,
-        tally: &mut impl Tally,
-        bound: impl Fn(&S) -> f32,
-        mut visit: impl FnMut(&mut S, u32, f32) -> ControlFlow<B>,
-    ) -> ControlFlow<B> {
-        if self.is_empty() {
-            return ControlFlow::Continue(());
-        }
-        let reach = reach(radius2(radius));
-        let Some(x) = self.window(centre.x, reach, 0) else { return ControlFlow::Continue(()) };
-        let Some(y) = self.window(centre.y, reach, 1) else { return ControlFlow::Continue(()) };
-        let Some(z) = self.window(centre.z, reach, 2) else { return ControlFlow::Continue(()) };
-        let (ys, zs) = (self.rows(centre.y, y, 1), self.rows(centre.z, z, 2));
-        let splat = splat(centre);
-        for &(z, z2) in &zs[..=(z.1 - z.0) as usize] {
-            for &(y, y2) in &ys[..=(y.1 - y.0) as usize] {
-                if y2 + z2 <= bound(state) {
-                    self.scan_row(self.hash.row(y, z), x, &splat, state, tally, &bound, &mut visit)?;
-                }
-            }
-        }
-        ControlFlow::Continue(())
-    }
-
-    #[inline]
-    fn scan_row<S, B>(
-        &self,
+        on: L,
         row: Row,
         (mut x, last): (u32, u32),
-        splat: &Splat,
+        splat: &Splat<L>,
         state: &mut S,
         tally: &mut impl Tally,
         bound: &impl Fn(&S) -> f32,
-        visit: &mut impl FnMut(&mut S, u32, f32) -> ControlFlow<B>,
+        visit: &mut impl FnMut(&mut S, Hits<L>) -> ControlFlow<B>,
     ) -> ControlFlow<B> {
         // Cells of a row lie side by side, up to the end of the brick.
         while x <= last {
@@ -174,7 +148,7 @@ impl HashGrid {
             let slot = row.slot(x);
             let (from, to) = (self.starts[slot], self.starts[slot + (end - x) as usize + 1]);
             tally.node();
-            self.blocks.scan(from as usize..to as usize, splat, state, tally, bound, visit)?;
+            self.blocks.scan(on, from as usize..to as usize, splat, state, tally, bound, visit)?;
             x = end + 1;
         }
         ControlFlow::Continue(())
@@ -183,7 +157,7 @@ impl HashGrid {
     /// First and last cell within the reach along an axis.
     #[inline]
     fn window(&self, x: f32, reach: f32, axis: usize) -> Option<(u32, u32)> {
-        let (from, to) = ((x - reach).next_down().max(f32::MIN), (x + reach).next_up().min(f32::MAX));
+        let (from, to) = ((x - reach).max(f32::MIN), (x + reach).min(f32::MAX));
         let to_cell = to * self.scale - self.base[axis];
         let (from, to) = (self.cell(from, axis), (to_cell as u32).min(self.last[axis]));
         (to_cell >= 0.0 && from <= to).then(|| {
@@ -222,9 +196,42 @@ impl HashGrid {
     }
 }
 
+impl Walk for HashGrid {
+    /// Visits what is within the reach, nearest rows of cells first; `bound` of the state may shrink as `visit` changes it.
+    #[inline(always)]
+    fn walk<L: Lanes, S, B>(
+        &self,
+        on: L,
+        centre: Vec3,
+        radius: f32,
+        state: &mut S,
+        tally: &mut impl Tally,
+        bound: impl Fn(&S) -> f32,
+        mut visit: impl FnMut(&mut S, Hits<L>) -> ControlFlow<B>,
+    ) -> ControlFlow<B> {
+        if self.is_empty() {
+            return ControlFlow::Continue(());
+        }
+        let reach = reach(radius2(radius));
+        let Some(x) = self.window(centre.x, reach, 0) else { return ControlFlow::Continue(()) };
+        let Some(y) = self.window(centre.y, reach, 1) else { return ControlFlow::Continue(()) };
+        let Some(z) = self.window(centre.z, reach, 2) else { return ControlFlow::Continue(()) };
+        let (ys, zs) = (self.rows(centre.y, y, 1), self.rows(centre.z, z, 2));
+        let splat = splat(on, centre);
+        for &(z, z2) in &zs[..=(z.1 - z.0) as usize] {
+            for &(y, y2) in &ys[..=(y.1 - y.0) as usize] {
+                if y2 + z2 <= bound(state) {
+                    self.scan_row(on, self.hash.row(y, z), x, &splat, state, tally, &bound, &mut visit)?;
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
+
 impl RadiusSearch for HashGrid {
     fn len(&self) -> usize {
-        self.blocks.order.len()
+        self.blocks.len()
     }
 
     fn max_radius(&self) -> f32 {
@@ -236,19 +243,13 @@ impl RadiusSearch for HashGrid {
         &self,
         centre: Vec3,
         radius: f32,
-        mut visit: impl FnMut(u32, f32) -> ControlFlow<B>,
+        visit: impl FnMut(u32, f32) -> ControlFlow<B>,
     ) -> ControlFlow<B> {
-        self.walk(centre, radius, &mut radius2(radius), &mut (), |r2| *r2, |_, i, d2| visit(i, d2))
+        blocks::within(self, centre, radius, visit)
     }
 
     fn nearest(&self, centre: Vec3, radius: f32, nearest: &mut Nearest) {
-        nearest.clear();
-        let radius2 = radius2(radius);
-        let bound = |nearest: &&mut Nearest| nearest.bound().min(radius2);
-        let _: ControlFlow<()> = self.walk(centre, radius, &mut &mut *nearest, &mut (), bound, |nearest, i, d2| {
-            nearest.insert(i, d2);
-            ControlFlow::Continue(())
-        });
+        blocks::nearest(self, centre, radius, nearest);
     }
 
     fn fold_all<T: Send>(
@@ -267,46 +268,25 @@ impl RadiusSearch for HashGrid {
             return fold_each(self, queries, radii, start, visit);
         }
         radii.check(queries, self.max_radius())?;
-        let mut slots = Vec::new();
-        queries.par_iter().with_min_len(8192).map(|&q| self.slot(q) as u32).collect_into_vec(&mut slots);
-        let (mut starts, mut order) = (Vec::new(), Vec::new());
-        counting_sort(&slots, self.starts.len() - 1, &mut starts, &mut order);
-        let fold = |&query: &u32| {
-            let mut state = start(query as usize);
-            self.within(queries[query as usize], radii.of(query as usize), |i, d2| visit(&mut state, i, d2));
-            state
-        };
-        let mut folded: Vec<T> = order.par_iter().with_min_len(GRAIN).map(fold).collect();
-        // Back to the order of the queries: each exchange puts one where it belongs.
-        for at in 0..order.len() {
-            while order[at] as usize != at {
-                let home = order[at] as usize;
-                folded.swap(at, home);
-                order.swap(at, home);
+        let mut states: Vec<T> = (0..queries.len()).into_par_iter().with_min_len(FEW).map(&start).collect();
+        let size = queries.len().div_ceil(2 * rayon::current_num_threads()).clamp(FEW, MANY);
+        states.par_chunks_mut(size).zip(queries.par_chunks(size)).enumerate().for_each(|(block, (states, queries))| {
+            let bricks: Vec<u32> = queries.iter().map(|&q| (self.slot(q) / BRICK) as u32).collect();
+            let (mut starts, mut order) = (Vec::new(), Vec::new());
+            counting_sort(&bricks, self.starts.len() / BRICK, &mut starts, &mut order);
+            for query in order.into_iter().map(|query| query as usize) {
+                let radius = radii.of(block * size + query);
+                self.within(queries[query], radius, |i, d2| visit(&mut states[query], i, d2));
             }
-        }
-        Ok(folded)
+        });
+        Ok(states)
     }
 }
 
 impl CountVisits for HashGrid {
     /// A node is a run of cells that lie side by side.
     fn visits(&self, centre: Vec3, radius: f32) -> Visits {
-        let mut visits = Visits::default();
-        let mut found = 0;
-        let _: ControlFlow<()> = self.walk(
-            centre,
-            radius,
-            &mut radius2(radius),
-            &mut visits,
-            |r2| *r2,
-            |_, _, _| {
-                found += 1;
-                ControlFlow::Continue(())
-            },
-        );
-        visits.found = found;
-        visits
+        blocks::visits(self, centre, radius)
     }
 }
 

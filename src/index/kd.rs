@@ -9,9 +9,10 @@ use std::ops::{ControlFlow, Range};
 
 use glam::Vec3;
 
-use super::blocks::{Blocks, NOTHING, WIDTH, bounds, join, splat};
+use super::blocks::{self, Blocks, Hits, NOTHING, Walk, bounds, join, splat};
+use super::lanes::{Lanes, WIDTH};
 use super::stats::{CountVisits, Hierarchy, Node, Tally, Visits};
-use super::{Error, Nearest, RadiusSearch, check_points, radius2};
+use super::{Error, Nearest, RadiusSearch, check_points};
 
 /// Blocks in the largest leaf.
 const LEAF_BLOCKS: usize = 2;
@@ -66,63 +67,6 @@ impl KdTree {
         blocks.start * WIDTH..(blocks.end * WIDTH).min(self.len())
     }
 
-    /// The nearer half first; `bound` of the state may shrink as `visit` changes it.
-    #[inline]
-    fn walk<S, B>(
-        &self,
-        centre: Vec3,
-        state: &mut S,
-        tally: &mut impl Tally,
-        bound: impl Fn(&S) -> f32,
-        mut visit: impl FnMut(&mut S, u32, f32) -> ControlFlow<B>,
-    ) -> ControlFlow<B> {
-        if self.is_empty() {
-            return ControlFlow::Continue(());
-        }
-        let (c, splat) = (centre.to_array(), splat(centre));
-        let outside = (self.bounds.0 - centre).max(centre - self.bounds.1).max(Vec3::ZERO);
-        let mut pending = [(0u32, 0u32, [0.0f32; 3]); MAX_DEPTH];
-        pending[0] = (0, self.splits.len() as u32, outside.to_array());
-        let mut n_pending = 1;
-        while n_pending > 0 {
-            n_pending -= 1;
-            let (start, end, mut away) = pending[n_pending];
-            let (mut start, mut end) = (start as usize, end as usize);
-            if square(away) > bound(state) {
-                continue;
-            }
-            tally.node();
-            while end - start > LEAF_BLOCKS {
-                let middle = start + (end - start) / 2;
-                let split = self.splits[middle];
-                let axis = split.axis as usize;
-                tally.boxes(2);
-                let (mut near, mut far) = (away, away);
-                let (to_first, to_second) = (c[axis] - split.first_max, split.second_min - c[axis]);
-                let first_is_near = to_first <= to_second;
-                near[axis] = near[axis].max(to_first.min(to_second));
-                far[axis] = far[axis].max(to_first.max(to_second));
-                let halves = [(start, middle), (middle, end)];
-                if square(far) <= bound(state) {
-                    let (start, end) = halves[usize::from(first_is_near)];
-                    pending[n_pending] = (start as u32, end as u32, far);
-                    n_pending += 1;
-                }
-                (start, end) = halves[usize::from(!first_is_near)];
-                away = near;
-                if square(away) > bound(state) {
-                    end = start;
-                    break;
-                }
-                tally.node();
-            }
-            if start < end {
-                self.blocks.scan(self.slots(&(start..end)), &splat, state, tally, &bound, &mut visit)?;
-            }
-        }
-        ControlFlow::Continue(())
-    }
-
     fn for_each_below(&self, blocks: Range<usize>, visit: &mut impl FnMut(Node)) {
         let slots = self.slots(&blocks);
         let n = slots.len();
@@ -168,9 +112,70 @@ fn split(points: &mut [(Vec3, u32)], splits: &mut [Split]) {
     }
 }
 
+impl Walk for KdTree {
+    /// The nearer half first; `bound` of the state may shrink as `visit` changes it.
+    #[inline(always)]
+    fn walk<L: Lanes, S, B>(
+        &self,
+        on: L,
+        centre: Vec3,
+        _radius: f32,
+        state: &mut S,
+        tally: &mut impl Tally,
+        bound: impl Fn(&S) -> f32,
+        mut visit: impl FnMut(&mut S, Hits<L>) -> ControlFlow<B>,
+    ) -> ControlFlow<B> {
+        if self.is_empty() {
+            return ControlFlow::Continue(());
+        }
+        let (c, splat) = (centre.to_array(), splat(on, centre));
+        let outside = (self.bounds.0 - centre).max(centre - self.bounds.1).max(Vec3::ZERO);
+        let mut pending = [(0u32, 0u32, [0.0f32; 3]); MAX_DEPTH];
+        pending[0] = (0, self.splits.len() as u32, outside.to_array());
+        let mut n_pending = 1;
+        while n_pending > 0 {
+            n_pending -= 1;
+            let (start, end, mut away) = pending[n_pending];
+            let (mut start, mut end) = (start as usize, end as usize);
+            if square(away) > bound(state) {
+                continue;
+            }
+            tally.node();
+            while end - start > LEAF_BLOCKS {
+                let middle = start + (end - start) / 2;
+                let split = self.splits[middle];
+                let axis = split.axis as usize;
+                tally.boxes(2);
+                let (mut near, mut far) = (away, away);
+                let (to_first, to_second) = (c[axis] - split.first_max, split.second_min - c[axis]);
+                let first_is_near = to_first <= to_second;
+                near[axis] = near[axis].max(to_first.min(to_second));
+                far[axis] = far[axis].max(to_first.max(to_second));
+                let halves = [(start, middle), (middle, end)];
+                if square(far) <= bound(state) {
+                    let (start, end) = halves[usize::from(first_is_near)];
+                    pending[n_pending] = (start as u32, end as u32, far);
+                    n_pending += 1;
+                }
+                (start, end) = halves[usize::from(!first_is_near)];
+                away = near;
+                if square(away) > bound(state) {
+                    end = start;
+                    break;
+                }
+                tally.node();
+            }
+            if start < end {
+                self.blocks.scan(on, self.slots(&(start..end)), &splat, state, tally, &bound, &mut visit)?;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
+
 impl RadiusSearch for KdTree {
     fn len(&self) -> usize {
-        self.blocks.order.len()
+        self.blocks.len()
     }
 
     #[inline]
@@ -178,38 +183,19 @@ impl RadiusSearch for KdTree {
         &self,
         centre: Vec3,
         radius: f32,
-        mut visit: impl FnMut(u32, f32) -> ControlFlow<B>,
+        visit: impl FnMut(u32, f32) -> ControlFlow<B>,
     ) -> ControlFlow<B> {
-        self.walk(centre, &mut radius2(radius), &mut (), |r2| *r2, |_, i, d2| visit(i, d2))
+        blocks::within(self, centre, radius, visit)
     }
 
     fn nearest(&self, centre: Vec3, radius: f32, nearest: &mut Nearest) {
-        nearest.clear();
-        let radius2 = radius2(radius);
-        let bound = |nearest: &&mut Nearest| nearest.bound().min(radius2);
-        let _: ControlFlow<()> = self.walk(centre, &mut &mut *nearest, &mut (), bound, |nearest, i, d2| {
-            nearest.insert(i, d2);
-            ControlFlow::Continue(())
-        });
+        blocks::nearest(self, centre, radius, nearest);
     }
 }
 
 impl CountVisits for KdTree {
     fn visits(&self, centre: Vec3, radius: f32) -> Visits {
-        let mut visits = Visits::default();
-        let mut found = 0;
-        let _: ControlFlow<()> = self.walk(
-            centre,
-            &mut radius2(radius),
-            &mut visits,
-            |r2| *r2,
-            |_, _, _| {
-                found += 1;
-                ControlFlow::Continue(())
-            },
-        );
-        visits.found = found;
-        visits
+        blocks::visits(self, centre, radius)
     }
 }
 

@@ -8,7 +8,8 @@ use std::ops::ControlFlow;
 
 use glam::Vec3;
 
-use super::blocks::{Blocks, NOTHING, Splat, around, join, reach, splat};
+use super::blocks::{self, Blocks, Hits, NOTHING, Splat, Walk, around, join, reach, splat};
+use super::lanes::{Lanes, Portable};
 use super::sample_build::Topology;
 use super::stats::{self, CountVisits, Hierarchy, Tally, Visits};
 use super::{Error, Nearest, RadiusSearch, check_points, check_radius, distance2, radius2};
@@ -109,6 +110,7 @@ impl SampleBvh {
         self.blocks.order.clear();
         self.depth = 0;
         if points.is_empty() {
+            self.blocks.fill(points);
             return;
         }
         let finite = |i: usize| {
@@ -196,38 +198,10 @@ impl SampleBvh {
         self.after(node + 1)
     }
 
-    /// Nodes in order, those below a box that fails skipped.
-    #[inline]
-    fn walk<S, B>(
-        &self,
-        centre: Vec3,
-        state: &mut S,
-        tally: &mut impl Tally,
-        bound: impl Fn(&S) -> f32,
-        mut visit: impl FnMut(&mut S, u32, f32) -> ControlFlow<B>,
-    ) -> ControlFlow<B> {
-        let inflated = matches!(self.options.boxes, Boxes::Inflated(_));
-        let splat = splat(centre);
-        let mut at = 0;
-        while let Some(node) = self.nodes.get(at) {
-            tally.boxes(1);
-            let is_in = if inflated { node.holds(centre) } else { node.distance2(centre) <= bound(state) };
-            if !is_in {
-                at = if node.n == 0 { node.link as usize } else { at + 1 };
-                continue;
-            }
-            tally.node();
-            if node.n > 0 {
-                self.leaf(node, &splat, state, tally, &bound, &mut visit)?;
-            }
-            at += 1;
-        }
-        ControlFlow::Continue(())
-    }
-
     /// Nearest boxes first. Tight boxes only.
-    fn walk_nearest(&self, centre: Vec3, radius2: f32, nearest: &mut Nearest) {
-        let splat = splat(centre);
+    #[inline(always)]
+    fn nearest_first<L: Lanes>(&self, on: L, centre: Vec3, radius2: f32, nearest: &mut Nearest) {
+        let splat = splat(on, centre);
         let bound = |nearest: &&mut Nearest| nearest.bound().min(radius2);
         let mut state = nearest;
         let mut pending = [(0u32, 0.0f32); STACK];
@@ -257,41 +231,38 @@ impl SampleBvh {
             }
             let node = &self.nodes[at];
             if node.n > 0 {
-                let _: ControlFlow<()> = self.leaf(node, &splat, &mut state, &mut (), &bound, &mut |nearest, i, d2| {
-                    nearest.insert(i, d2);
-                    ControlFlow::Continue(())
-                });
+                let _: ControlFlow<()> =
+                    self.leaf(on, node, &splat, &mut state, &mut (), &bound, &mut |nearest, hits| {
+                        hits.for_each(on, |i, d2| nearest.insert(i, d2));
+                        ControlFlow::Continue(())
+                    });
             }
         }
     }
 
-    #[inline]
-    fn leaf<S, B>(
+    #[inline(always)]
+    fn leaf<L: Lanes, S, B>(
         &self,
+        on: L,
         node: &Node,
-        centre: &Splat,
+        centre: &Splat<L>,
         state: &mut S,
         tally: &mut impl Tally,
         bound: &impl Fn(&S) -> f32,
-        visit: &mut impl FnMut(&mut S, u32, f32) -> ControlFlow<B>,
+        visit: &mut impl FnMut(&mut S, Hits<L>) -> ControlFlow<B>,
     ) -> ControlFlow<B> {
         let slots = node.link as usize..(node.link + node.n) as usize;
-        self.blocks.scan(slots, centre, state, tally, bound, visit)
+        self.blocks.scan(on, slots, centre, state, tally, bound, visit)
     }
 
     /// Calls `visit` with the index of each point whose box holds `centre`, and perhaps of some whose box does not.
     #[inline]
     pub(super) fn holding(&self, centre: Vec3, mut visit: impl FnMut(u32)) {
-        let _: ControlFlow<()> = self.walk(
-            centre,
-            &mut (),
-            &mut (),
-            |()| f32::INFINITY,
-            |(), i, _| {
-                visit(i);
-                ControlFlow::Continue(())
-            },
-        );
+        let bound = |_: &()| f32::INFINITY;
+        let _: ControlFlow<()> = self.walk(Portable, centre, f32::INFINITY, &mut (), &mut (), bound, |(), hits| {
+            hits.for_each(Portable, |i, _| visit(i));
+            ControlFlow::Continue(())
+        });
     }
 }
 
@@ -312,9 +283,57 @@ impl Node {
     }
 }
 
+impl Walk for SampleBvh {
+    /// Nodes in order, those below a box that fails skipped.
+    #[inline(always)]
+    fn walk<L: Lanes, S, B>(
+        &self,
+        on: L,
+        centre: Vec3,
+        _radius: f32,
+        state: &mut S,
+        tally: &mut impl Tally,
+        bound: impl Fn(&S) -> f32,
+        mut visit: impl FnMut(&mut S, Hits<L>) -> ControlFlow<B>,
+    ) -> ControlFlow<B> {
+        let inflated = matches!(self.options.boxes, Boxes::Inflated(_));
+        let splat = splat(on, centre);
+        let mut at = 0;
+        while let Some(node) = self.nodes.get(at) {
+            tally.boxes(1);
+            let is_in = if inflated { node.holds(centre) } else { node.distance2(centre) <= bound(state) };
+            if !is_in {
+                at = if node.n == 0 { node.link as usize } else { at + 1 };
+                continue;
+            }
+            tally.node();
+            if node.n > 0 {
+                self.leaf(on, node, &splat, state, tally, &bound, &mut visit)?;
+            }
+            at += 1;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// With inflated boxes the search cannot shrink, as the paper says: all that hold the centre are visited.
+    #[inline(always)]
+    fn walk_nearest<L: Lanes>(&self, on: L, centre: Vec3, radius: f32, mut nearest: &mut Nearest) {
+        let radius2 = radius2(radius);
+        if self.options.boxes == Boxes::Tight && self.depth < STACK {
+            self.nearest_first(on, centre, radius2, nearest);
+            return;
+        }
+        let bound = |nearest: &&mut Nearest| nearest.bound().min(radius2);
+        let _: ControlFlow<()> = self.walk(on, centre, radius, &mut nearest, &mut (), bound, |nearest, hits| {
+            hits.for_each(on, |i, d2| nearest.insert(i, d2));
+            ControlFlow::Continue(())
+        });
+    }
+}
+
 impl RadiusSearch for SampleBvh {
     fn len(&self) -> usize {
-        self.blocks.order.len()
+        self.blocks.len()
     }
 
     fn max_radius(&self) -> f32 {
@@ -329,38 +348,19 @@ impl RadiusSearch for SampleBvh {
         &self,
         centre: Vec3,
         radius: f32,
-        mut visit: impl FnMut(u32, f32) -> ControlFlow<B>,
+        visit: impl FnMut(u32, f32) -> ControlFlow<B>,
     ) -> ControlFlow<B> {
-        self.walk(centre, &mut radius2(radius), &mut (), |r2| *r2, |_, i, d2| visit(i, d2))
+        blocks::within(self, centre, radius, visit)
     }
 
-    /// With inflated boxes the search cannot shrink, as the paper says: all that hold the centre are visited.
     fn nearest(&self, centre: Vec3, radius: f32, nearest: &mut Nearest) {
-        nearest.clear();
-        if self.options.boxes == Boxes::Tight && self.depth < STACK {
-            self.walk_nearest(centre, radius2(radius), nearest);
-        } else {
-            self.within(centre, radius, |i, d2| nearest.insert(i, d2));
-        }
+        blocks::nearest(self, centre, radius, nearest);
     }
 }
 
 impl CountVisits for SampleBvh {
     fn visits(&self, centre: Vec3, radius: f32) -> Visits {
-        let mut visits = Visits::default();
-        let mut found = 0;
-        let _: ControlFlow<()> = self.walk(
-            centre,
-            &mut radius2(radius),
-            &mut visits,
-            |r2| *r2,
-            |_, _, _| {
-                found += 1;
-                ControlFlow::Continue(())
-            },
-        );
-        visits.found = found;
-        visits
+        blocks::visits(self, centre, radius)
     }
 }
 

@@ -1,5 +1,6 @@
-//! Directions, random numbers and warps. Knows nothing of the rest of the crate.
+//! Directions, random numbers, warps and seeded point sets. Knows nothing of the rest of the crate.
 
+pub mod clouds;
 pub mod frame;
 pub mod ggx;
 pub mod morton;

@@ -2,6 +2,7 @@
 //! that samples are dense where the surface faces a scanner and sparse where it turns away, with noise along the ray.
 
 use std::f64::consts::TAU;
+use std::sync::LazyLock;
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -19,7 +20,8 @@ const PROBE: usize = 64;
 const JITTER: f64 = 0.25;
 const BUMPS: usize = 24;
 const MAX_STEPS: usize = 400;
-const HIT: f64 = 1e-9;
+/// Below the rounding of positions to 32 bits.
+const HIT: f64 = 2e-8;
 
 /// A closed surface, about 2 across, around the origin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +43,7 @@ impl Shape {
         match self {
             Self::Sphere => p.length() - 0.9,
             Self::Torus => DVec2::new(p.truncate().length() - 0.65, p.z).length() - 0.3,
-            // Lipschitz: the radius changes by less than 0.7 a radian, and no surface point is nearer than 0.5.
+            // |p| − r has a gradient of at most 1.5 outside (r from 0.57 to 1, at most 0.84 a radian).
             Self::Bumpy => 0.55 * (p.length() - bumpy_radius(p.normalize_or(DVec3::Z))),
         }
     }
@@ -70,14 +72,22 @@ impl Shape {
     }
 }
 
-/// Sum of smooth caps, each up or down.
+/// A smooth cap: its middle, the cosine at its rim, and its height.
+static CAPS: LazyLock<[(DVec3, f64, f64); BUMPS]> = LazyLock::new(|| {
+    std::array::from_fn(|i| {
+        let width = 0.25 + 0.2 * (i as f64 * 0.754_877_666).fract();
+        (around(i, BUMPS), 1.0 - width, if i % 3 == 0 { -0.12 } else { 0.08 })
+    })
+});
+
 fn bumpy_radius(direction: DVec3) -> f64 {
-    let mut radius = 0.8;
-    for i in 0..BUMPS {
-        let axis = around(i, BUMPS);
-        let half = 0.25 + 0.2 * (i as f64 * 0.754_877_666).fract();
-        let cap = ((direction.dot(axis) - (1.0 - half)) / half).max(0.0);
-        radius += if i % 3 == 0 { -0.12 } else { 0.08 } * cap * cap * (3.0 - 2.0 * cap);
+    let mut radius = 0.78;
+    for &(middle, rim, height) in CAPS.iter() {
+        let cosine = direction.dot(middle);
+        if cosine > rim {
+            let x = (cosine - rim) / (1.0 - rim);
+            radius += height * x * x * (3.0 - 2.0 * x);
+        }
     }
     radius
 }

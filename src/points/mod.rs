@@ -35,7 +35,7 @@ pub enum Error {
         /// In words, with the line or the vertex.
         problem: String,
     },
-    /// NaN, infinite, or beyond ±[`cloud::MAX_COORDINATE`].
+    /// NaN, infinite, or beyond ±1e100.
     #[error("point {0}: a coordinate is not a number of reasonable size")]
     Coordinate(usize),
     /// Fewer points than the task takes.

@@ -11,7 +11,10 @@ use crate::index::MAX_K;
 const BATCH: usize = 1 << 16;
 /// Points of a neighbourhood, at least: a plane takes three.
 const MIN_K: usize = 3;
-/// Width over length below which a neighbourhood is a line and says nothing of the plane it lies in.
+/// Width over length of a neighbourhood, below which more points are taken: along one scan line the plane that fits best
+/// is the one that the line bends in, square to the surface.
+const NARROW: f64 = 0.05;
+/// The same, below which points are a line and have no plane.
 const LINE: f64 = 1e-4;
 const EIGEN_ITERATIONS: usize = 64;
 
@@ -26,20 +29,18 @@ pub struct Normals {
 
 /// The normal of each point, from its `k` nearest points, itself included; k from 3 to 64.
 ///
-/// Where they lie on a line, as the neighbours along one scan line do, 64 are taken.
+/// Where they lie next to a line, as the neighbours along one scan line do, 64 are taken.
 pub fn estimate(cloud: &Indexed, k: usize) -> Result<Normals, Error> {
     let k = needs(cloud, k)?;
     let mut normals = Vec::with_capacity(cloud.positions().len());
     for queries in cloud.positions().chunks(BATCH) {
-        normals.extend(of_batch(cloud, queries, k)?);
+        normals.extend(of_batch(cloud, queries, k, NARROW)?);
     }
     let missing: Vec<usize> = (0..normals.len()).filter(|&i| normals[i] == Vec3::ZERO).collect();
-    if k < MAX_K {
-        for batch in missing.chunks(BATCH) {
-            let queries: Vec<DVec3> = batch.iter().map(|&i| cloud.positions()[i]).collect();
-            for (&i, normal) in batch.iter().zip(of_batch(cloud, &queries, MAX_K)?) {
-                normals[i] = normal;
-            }
+    for batch in missing.chunks(BATCH) {
+        let queries: Vec<DVec3> = batch.iter().map(|&i| cloud.positions()[i]).collect();
+        for (&i, normal) in batch.iter().zip(of_batch(cloud, &queries, MAX_K, LINE)?) {
+            normals[i] = normal;
         }
     }
     let undefined = missing.iter().filter(|&&i| normals[i] == Vec3::ZERO).count();
@@ -58,17 +59,17 @@ fn needs(cloud: &Indexed, k: usize) -> Result<usize, Error> {
     Ok(k)
 }
 
-fn of_batch(cloud: &Indexed, queries: &[DVec3], k: usize) -> Result<Vec<Vec3>, Error> {
+fn of_batch(cloud: &Indexed, queries: &[DVec3], k: usize, width: f64) -> Result<Vec<Vec3>, Error> {
     let lists = cloud.nearest(queries, f64::INFINITY, k)?;
     let normal = |row: &[u32]| {
         let near = row.iter().filter_map(|&i| cloud.positions().get(i as usize)).copied();
-        plane_normal(near).unwrap_or(Vec3::ZERO)
+        plane_normal(near, width).unwrap_or(Vec3::ZERO)
     };
     Ok(lists.indices.par_chunks(k).with_min_len(256).map(normal).collect())
 }
 
-/// Of the plane that fits best; None if the points lie on a line or in one place.
-fn plane_normal(points: impl Iterator<Item = DVec3> + Clone) -> Option<Vec3> {
+/// Of the plane that fits best; None if the points are not so wide in it, as a share of their length.
+fn plane_normal(points: impl Iterator<Item = DVec3> + Clone, width: f64) -> Option<Vec3> {
     let (n, sum) = points.clone().fold((0, DVec3::ZERO), |(n, sum), p| (n + 1, sum + p));
     let mean = sum / f64::from(n);
     let size = points.clone().map(|p| (p - mean).abs().max_element()).fold(0.0, f64::max);
@@ -87,7 +88,7 @@ fn plane_normal(points: impl Iterator<Item = DVec3> + Clone) -> Option<Vec3> {
     let eigen = SymmetricEigen::try_new(matrix, f64::EPSILON, EIGEN_ITERATIONS)?;
     let mut order = [0, 1, 2];
     order.sort_unstable_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
-    if eigen.eigenvalues[order[1]] <= LINE * LINE * eigen.eigenvalues[order[2]] {
+    if eigen.eigenvalues[order[1]] <= width * width * eigen.eigenvalues[order[2]] {
         return None;
     }
     let axis = eigen.eigenvectors.column(order[0]);

@@ -157,6 +157,7 @@ fn wrong_usage() {
         ("render floor.gltf -o a.png --threads 0", "--threads"),
         ("render floor.gltf -o a.png --kernel gauss", "epanechnikov"),
         ("render floor.gltf -o a.png --backend cpu --device 0", "--device 0"),
+        ("render floor.gltf -o a.png --backend cpu --index hardware", "--index hardware"),
         ("render floor.gltf -o a.png -q -v", "--verbose"),
         ("render floor.gltf -o a.png --aplha 0.5", "--alpha"),
         ("render floor.gltf -o a.png --set nonsense", "--set nonsense"),
@@ -352,6 +353,7 @@ fn the_report() {
     assert_eq!(report["settings"]["maxSegments"], 9);
     assert_eq!(report["settings"]["maxEyeSegments"], 9);
     assert_eq!(report["device"]["backend"], "cpu");
+    assert_eq!(report["device"]["index"], "tree");
     assert_eq!(report["outputs"], json!(["a.exr"]));
     let iterations = report["iterations"].as_array().unwrap();
     assert_eq!(iterations.len(), 3);
@@ -513,11 +515,25 @@ fn both_backends_make_the_same_picture() {
         return;
     }
     let args = "render floor.gltf -r 32x16 --photons 2k --iterations 2 --radius 0.2";
-    for backend in ["cpu", "gpu"] {
-        let output = sunfleck(folder.path(), words(&format!("{args} --backend {backend} -o {backend}.exr")));
+    let render = |name: &str, options: &str| {
+        let output = sunfleck(folder.path(), words(&format!("{args} {options} -o {name}.exr --json {name}.json")));
         assert!(output.status.success(), "{}", stderr(&output));
+        output::exr::read(&folder.path().join(format!("{name}.exr"))).unwrap()
+    };
+    let cpu = render("cpu", "--backend cpu");
+    let same = |picture| {
+        let difference = output::compare::compare(&picture, &cpu).unwrap();
+        assert!(difference.rel_mse_trimmed < 1e-4, "{difference:?}");
+        assert!(difference.relative_mean_difference.abs() < 1e-3, "{difference:?}");
+    };
+    same(render("gpu", "--backend gpu"));
+    if !list.contains("ray queries") {
+        assert!(std::env::var_os("SUNFLECK_REQUIRE_RAY_QUERY").is_none(), "no GPU adapter with ray queries");
+        println!("skipped: no GPU adapter with ray queries");
+        return;
     }
-    let read = |name: &str| output::exr::read(&folder.path().join(name)).unwrap();
-    let difference = output::compare::compare(&read("gpu.exr"), &read("cpu.exr")).unwrap();
-    assert!(difference.rel_mse_trimmed < 1e-4 && difference.relative_mean_difference.abs() < 1e-3, "{difference:?}");
+    same(render("rays", "--backend gpu --index hardware"));
+    let report = std::fs::read_to_string(folder.path().join("rays.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(report["device"]["index"], "hardware");
 }

@@ -3,7 +3,8 @@
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
 
 use glam::Vec3;
-use sunfleck::gpu::{Choice, Context, GpuStages};
+use sunfleck::gpu::{Choice, Context, GpuStages, Method};
+use sunfleck::index;
 use sunfleck::layout::{self, Camera, EyeVertex, FANOUT, Frame, LEAF_SIZE, Photon, PointBox};
 use sunfleck::math::{morton, oct, rng};
 use sunfleck::ppm::{Error, Stages, film};
@@ -17,6 +18,17 @@ fn stages() -> Option<MutexGuard<'static, GpuStages>> {
     let context = context()?;
     let stages = STAGES.get_or_init(|| {
         Mutex::new(GpuStages::new(context, &PackedScene::default(), Camera::default()).expect("stages"))
+    });
+    Some(stages.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
+}
+
+/// One more that gathers by ray queries.
+fn hardware_stages() -> Option<MutexGuard<'static, GpuStages>> {
+    static STAGES: OnceLock<Mutex<GpuStages>> = OnceLock::new();
+    let context = crate::gpu_hardware::context()?;
+    let stages = STAGES.get_or_init(|| {
+        let stages = GpuStages::with_method(context, &PackedScene::default(), Camera::default(), Method::Hardware);
+        Mutex::new(stages.expect("stages"))
     });
     Some(stages.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
 }
@@ -176,6 +188,16 @@ fn gather_frame(n: u32, flags: u32) -> Frame {
 #[test]
 fn gather_finds_what_brute_force_finds() {
     let Some(mut gpu) = stages() else { return };
+    assert_gathers(&mut gpu);
+}
+
+#[test]
+fn ray_queries_find_what_brute_force_finds() {
+    let Some(mut gpu) = hardware_stages() else { return };
+    assert_gathers(&mut gpu);
+}
+
+fn assert_gathers(gpu: &mut GpuStages) {
     for (name, photons) in photon_sets() {
         let n = 300;
         let vertices: Vec<_> = (0..n).map(|i| eye_vertex(&photons, i)).collect();
@@ -220,6 +242,36 @@ fn the_same_input_gives_the_same_bits() {
         gpu.radiance().expect("radiance").into_iter().flatten().map(f32::to_bits).collect::<Vec<_>>()
     };
     assert!(run() == run());
+}
+
+/// Boxes are as wide as the radius they were built for.
+#[test]
+fn ray_queries_refuse_radii_above_the_built_one() {
+    let Some(mut gpu) = hardware_stages() else { return };
+    let (_, photons) = photon_sets().swap_remove(2);
+    let frame = gather_frame(4, 0);
+    let vertices: Vec<_> = (0..4).map(|i| eye_vertex(&photons, i)).collect();
+    gpu.set_eye_vertices(&vertices).expect("vertices");
+    gpu.set_photons(&photons).expect("photons");
+    gpu.set_first_radii(&[0.1, 0.3, 0.2, 0.0]).expect("radii");
+    gpu.build_index(&frame).expect("build");
+    gpu.gather(&frame).expect("gather");
+    gpu.set_first_radii(&[0.1, 0.1, 0.4, 0.0]).expect("radii");
+    match gpu.gather(&frame) {
+        Err(Error::Search(index::Error::RadiusAboveBuilt { query: 2, radius, built })) => {
+            assert_eq!((radius, built), (0.4 * frame.radius_scale, 0.3 * frame.radius_scale));
+        }
+        other => panic!("{other:?}"),
+    }
+    gpu.build_index(&frame).expect("build");
+    gpu.gather(&frame).expect("gather");
+}
+
+#[test]
+fn ray_queries_need_a_device_opened_for_them() {
+    let Some(context) = context() else { return };
+    let refused = GpuStages::with_method(context, &PackedScene::default(), Camera::default(), Method::Hardware);
+    assert!(matches!(refused.err(), Some(Error::NoDevice(_))));
 }
 
 #[test]

@@ -31,17 +31,17 @@ fn search() -> Option<PointSearch> {
 }
 
 /// Three numbers in [−1, 1).
-fn cube(seed: u32, i: u32) -> Vec3 {
+pub fn cube(seed: u32, i: u32) -> Vec3 {
     let [x, y, z, _] = rng::unit4(rng::pcg4d([i, seed, 3, 4]));
     Vec3::new(x, y, z) * 2.0 - 1.0
 }
 
-fn uniform(seed: u32, n: u32) -> Vec<Vec3> {
+pub fn uniform(seed: u32, n: u32) -> Vec<Vec3> {
     (0..n).map(|i| cube(seed, i)).collect()
 }
 
 /// Point sets that have broken trees before.
-fn clouds() -> Vec<(&'static str, Vec<Vec3>)> {
+pub fn clouds() -> Vec<(&'static str, Vec<Vec3>)> {
     let n = 2500;
     let make = |at: &dyn Fn(u32) -> Vec3| (0..n).map(at).collect::<Vec<_>>();
     vec![
@@ -71,7 +71,7 @@ fn clouds() -> Vec<(&'static str, Vec<Vec3>)> {
 }
 
 /// Queries at and beside points, with radii from zero to all, some of which reach another point exactly.
-fn queries(points: &[Vec3], n: u32) -> (Vec<Vec3>, Vec<f32>) {
+pub fn queries(points: &[Vec3], n: u32) -> (Vec<Vec3>, Vec<f32>) {
     let at = |i: u32| points.get(i as usize % points.len().max(1)).copied().unwrap_or(Vec3::ONE);
     let low = points.iter().copied().reduce(Vec3::min).unwrap_or_default();
     let high = points.iter().copied().reduce(Vec3::max).unwrap_or_default();
@@ -99,13 +99,13 @@ fn queries(points: &[Vec3], n: u32) -> (Vec<Vec3>, Vec<f32>) {
 const BAND: f32 = 4.0 * f32::EPSILON;
 
 /// Software does as the host does, bit for bit.
-fn is_exact(search: &PointSearch) -> bool {
+pub fn is_exact(search: &PointSearch) -> bool {
     search.context().info().kind == DeviceKind::Cpu
 }
 
 /// Compares the rows as sets; returns the neighbours found by one alone, each within the band around r.
 #[track_caller]
-fn assert_same_sets(
+pub fn assert_same_sets(
     name: &str,
     points: &[Vec3],
     queries: &[Vec3],
@@ -147,7 +147,18 @@ fn assert_same_sets(
 #[test]
 fn the_same_sets_as_on_the_host() {
     let Some(mut search) = search() else { return };
-    let exact = is_exact(&search);
+    assert_sets(&mut search);
+}
+
+/// In boxes that contain every query.
+#[test]
+fn ray_queries_find_the_same_sets() {
+    let Some(context) = crate::gpu_hardware::context() else { return };
+    assert_sets(&mut PointSearch::hardware(context, f32::INFINITY).expect("kernels"));
+}
+
+fn assert_sets(search: &mut PointSearch) {
+    let exact = is_exact(search);
     let (mut n_queries, mut n_found, mut n_differences) = (0, 0, 0);
     for (name, points) in clouds() {
         search.build(&points).expect("build");

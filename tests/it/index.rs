@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 use proptest::prelude::*;
-use sunfleck::index::{BruteForce, FANOUT, LEAF_SIZE, Nearest, PointBvh, RadiusSearch, distance2};
+use sunfleck::index::{BruteForce, FANOUT, LEAF_SIZE, Nearest, PointBvh, Radii, RadiusSearch, distance2};
 use sunfleck::math::{rng, warp};
 
 /// Three numbers in [−1, 1).
@@ -238,6 +238,40 @@ fn threads_do_not_change_the_tree() {
     let one = at(1);
     assert!(one == at(3));
     assert_sound(&points, &PointBvh::new(&points).unwrap());
+}
+
+/// A batch meets the neighbours of each query in the order that a single query does, bit for bit: whatever the packets, the
+/// sorting and the number of threads, and where a packet's points are too many to be gathered at once.
+#[test]
+fn batches_meet_neighbours_in_the_order_of_single_queries() {
+    let points = clustered(3, 20_000);
+    let tree = PointBvh::new(&points).unwrap();
+    let along: Vec<Vec3> = (0..9000).map(|i| cube(1, 0) + Vec3::new(i as f32 * 2e-5, 0.0, 0.0)).collect();
+    let about: Vec<Vec3> = (0..9000).map(|i| cube(11, i)).collect();
+    let together = vec![points[17]; 70];
+    let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let (one, three) = (pool(1), pool(3));
+    let mut most = 0;
+    for (queries, radius) in
+        [(&along, 0.05), (&about, 0.05), (&along, 0.0), (&together, 0.3), (&together, f32::INFINITY)]
+    {
+        let radii: Vec<f32> = (0..queries.len() as u32).map(|i| radius * (0.3 + cube(12, i).x.abs())).collect();
+        for radii in [Radii::One(radius), Radii::Each(&radii)] {
+            let fold = || {
+                let push = |row: &mut Vec<(u32, u32)>, i: u32, d2: f32| row.push((i, d2.to_bits()));
+                tree.fold_all(queries, radii, |_| Vec::new(), push).unwrap()
+            };
+            let rows = one.install(fold);
+            assert!(rows == three.install(fold), "threads change the rows");
+            for (q, row) in rows.iter().enumerate() {
+                let mut single = Vec::new();
+                tree.within(queries[q], radii.of(q), |i, d2| single.push((i, d2.to_bits())));
+                assert!(*row == single, "query {q}, {} around {}", radii.of(q), queries[q]);
+                most = most.max(row.len());
+            }
+        }
+    }
+    assert_eq!(most, points.len());
 }
 
 fn coordinate() -> impl Strategy<Value = f32> {

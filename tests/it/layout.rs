@@ -132,7 +132,11 @@ fn every_shader_is_valid() {
         let module = wgsl_module(name);
         assert!(!module.entry_points.is_empty(), "{name} has no entry point");
         let flags = naga::valid::ValidationFlags::all();
-        if let Err(error) = naga::valid::Validator::new(flags, naga::valid::Capabilities::empty()).validate(&module) {
+        let allowed = match shaders::needs_ray_queries(name) {
+            true => naga::valid::Capabilities::RAY_QUERY,
+            false => naga::valid::Capabilities::empty(),
+        };
+        if let Err(error) = naga::valid::Validator::new(flags, allowed).validate(&module) {
             panic!("{name}: {}", error.emit_to_string(&shaders::source(name)));
         }
         for entry in &module.entry_points {

@@ -3,9 +3,13 @@
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod backends;
 #[cfg(feature = "render")]
+mod bench;
+#[cfg(feature = "render")]
 mod cli;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod gpu;
+#[cfg(feature = "gpu")]
+mod gpu_hardware;
 #[cfg(feature = "gpu")]
 mod gpu_search;
 mod index;
@@ -17,6 +21,8 @@ mod layout;
 mod loading;
 #[cfg(feature = "render")]
 mod physics;
+#[cfg(feature = "render")]
+mod points;
 #[cfg(feature = "render")]
 mod reference;
 #[cfg(feature = "render")]

@@ -69,6 +69,8 @@ pub enum Command {
     #[command(after_help = "relMSE is the mean over pixels and channels of (x - y)² / (y² + 0.01); \
         the trimmed one leaves out the worst 0.1 % of the pixels.")]
     Compare(CompareArgs),
+    /// Make the evaluation of the neighbour search again: figures and tables
+    Bench(crate::bench::BenchArgs),
     /// Geometry tasks on point clouds: normals, correspondence, registration
     Points(points::PointsArgs),
 }
@@ -172,6 +174,10 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N|NAME", help_heading = "Device")]
     pub device: Option<String>,
 
+    /// How the GPU finds photons; hardware: by ray queries, where the adapter has them (see --list-devices)
+    #[arg(long, value_parser = ["tree", "hardware"], default_value = "tree", help_heading = "Device")]
+    pub index: String,
+
     /// CPU threads [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Device")]
     pub threads: Option<u16>,
@@ -264,7 +270,7 @@ fn crop(text: &str) -> Result<Crop, String> {
     Ok(Crop([x0, x1, y0, y1]))
 }
 
-fn size(text: &str) -> Result<[u32; 2], String> {
+pub fn size(text: &str) -> Result<[u32; 2], String> {
     let (width, height) = text.split_once(['x', 'X', '×']).ok_or("a size looks like 1280x720")?;
     let side = |t: &str| match t.trim().parse() {
         Ok(n) if (1..=MAX_SIDE).contains(&n) => Ok(n),

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use anyhow::{Result, anyhow, bail};
 use sunfleck::cpu::CpuStages;
 #[cfg(feature = "gpu")]
-use sunfleck::gpu::{self, Choice, Context, GpuStages};
+use sunfleck::gpu::{self, Choice, Context, GpuStages, Method};
 use sunfleck::ppm::Stages;
 use sunfleck::scene::PackedScene;
 
@@ -18,7 +18,7 @@ use crate::progress::Progress;
 pub enum Device {
     Cpu,
     #[cfg(feature = "gpu")]
-    Gpu(Arc<Context>),
+    Gpu(Arc<Context>, Method),
 }
 
 /// Limits the CPU's threads.
@@ -32,15 +32,45 @@ pub fn open(args: &RenderArgs, progress: &Progress) -> Result<Device> {
     if args.backend != "cpu" {
         return open_gpu(args, progress);
     }
+    if args.index != "tree" {
+        bail!(Usage(format!("--index {} needs a GPU, --backend cpu does without", args.index)));
+    }
     match &args.device {
         Some(device) => bail!(Usage(format!("--device {device} names a GPU, --backend cpu does without"))),
         None => Ok(Device::Cpu),
     }
 }
 
+/// `cpu`, or the best adapter there is: `gpu`, or `gpu-hardware` for its ray queries.
+#[cfg(feature = "gpu")]
+pub fn open_backend(name: &str) -> Result<Device> {
+    Ok(match name {
+        "cpu" => Device::Cpu,
+        "gpu-hardware" => Device::Gpu(Arc::new(Context::with_ray_queries(&Choice::Any)?), Method::Hardware),
+        _ => Device::Gpu(Arc::new(Context::new(&Choice::Any)?), Method::Tree),
+    })
+}
+
+/// `cpu`: there is no other.
+#[cfg(not(feature = "gpu"))]
+pub fn open_backend(name: &str) -> Result<Device> {
+    match name {
+        "cpu" => Ok(Device::Cpu),
+        _ => bail!("this sunfleck was built without the GPU backend"),
+    }
+}
+
+/// Whether there is a GPU that is not software.
+pub fn has_real_gpu() -> bool {
+    #[cfg(feature = "gpu")]
+    return gpu::list_devices().iter().any(gpu::DeviceInfo::is_real);
+    #[cfg(not(feature = "gpu"))]
+    false
+}
+
 #[cfg(not(feature = "gpu"))]
 fn open_gpu(args: &RenderArgs, _: &Progress) -> Result<Device> {
-    match args.backend == "gpu" || args.device.is_some() {
+    match args.backend == "gpu" || args.device.is_some() || args.index != "tree" {
         true => bail!("this sunfleck was built without the GPU backend"),
         false => Ok(Device::Cpu),
     }
@@ -49,19 +79,24 @@ fn open_gpu(args: &RenderArgs, _: &Progress) -> Result<Device> {
 #[cfg(feature = "gpu")]
 fn open_gpu(args: &RenderArgs, progress: &Progress) -> Result<Device> {
     let devices = gpu::list_devices();
+    let method = if args.index == "hardware" { Method::Hardware } else { Method::Tree };
     let choice = match &args.device {
         Some(wanted) => {
             let index = wanted.parse().ok().filter(|&i: &usize| devices.iter().any(|d| d.index == i));
             index.map_or_else(|| Choice::Name(wanted.clone()), Choice::Index)
         }
         None if args.backend == "gpu" => Choice::Any,
-        None if devices.iter().any(gpu::DeviceInfo::is_real) => Choice::Real,
+        None if devices.iter().any(gpu::DeviceInfo::is_real) || method == Method::Hardware => Choice::Real,
         None => return Ok(Device::Cpu),
     };
-    match Context::new(&choice) {
-        Ok(context) => Ok(Device::Gpu(Arc::new(context))),
+    let opened = match method {
+        Method::Tree => Context::new(&choice),
+        Method::Hardware => Context::with_ray_queries(&choice),
+    };
+    match opened {
+        Ok(context) => Ok(Device::Gpu(Arc::new(context), method)),
         // Nobody asked for a GPU, and there is something else.
-        Err(error) if choice == Choice::Real => {
+        Err(error) if choice == Choice::Real && method == Method::Tree => {
             progress.say(&format!("sunfleck: warning: {error}; using the CPU"));
             Ok(Device::Cpu)
         }
@@ -75,7 +110,25 @@ impl Device {
         match self {
             Self::Cpu => "cpu",
             #[cfg(feature = "gpu")]
-            Self::Gpu(_) => "gpu",
+            Self::Gpu(..) => "gpu",
+        }
+    }
+
+    /// `tree` or `hardware`.
+    pub fn index(&self) -> String {
+        match self {
+            Self::Cpu => "tree".to_owned(),
+            #[cfg(feature = "gpu")]
+            Self::Gpu(_, method) => method.to_string(),
+        }
+    }
+
+    /// What the adapter is called, if this is one.
+    pub fn gpu_name(&self) -> Option<String> {
+        match self {
+            Self::Cpu => None,
+            #[cfg(feature = "gpu")]
+            Self::Gpu(context, _) => Some(context.info().to_string()),
         }
     }
 
@@ -87,7 +140,9 @@ impl Device {
         Ok(match self {
             Self::Cpu => Box::new(CpuStages::new(scene, camera, params.film_size())),
             #[cfg(feature = "gpu")]
-            Self::Gpu(context) => Box::new(GpuStages::new(Arc::clone(context), &scene, camera)?),
+            Self::Gpu(context, method) => {
+                Box::new(GpuStages::with_method(Arc::clone(context), &scene, camera, *method)?)
+            }
         })
     }
 }

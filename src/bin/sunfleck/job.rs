@@ -120,10 +120,7 @@ impl Job {
         let [width, height] = size.unwrap_or_else(|| default_size(camera));
         let mut params = Params::new(width, height);
         if args.paper {
-            params.direct = Direct::Photons;
-            params.roulette = false;
-            params.max_eye_segments = PAPER_SEGMENTS;
-            params.max_photon_segments = PAPER_SEGMENTS;
+            use_paper_mode(&mut params);
         }
         if let Some(crop) = args.crop {
             let nothing = || Usage(format!("--crop: no pixel of {width}x{height} is left"));
@@ -143,6 +140,14 @@ impl Job {
         check_memory(&params)?;
         Ok(params)
     }
+}
+
+/// The setting of the literature.
+pub fn use_paper_mode(params: &mut Params) {
+    params.direct = Direct::Photons;
+    params.roulette = false;
+    params.max_eye_segments = PAPER_SEGMENTS;
+    params.max_photon_segments = PAPER_SEGMENTS;
 }
 
 fn first_radius(radius: settings::FirstRadius) -> FirstRadius {

@@ -1,5 +1,6 @@
 //! The `sunfleck` program: parse, dispatch, exit code.
 
+mod bench;
 mod cli;
 mod compare;
 mod devices;
@@ -38,6 +39,7 @@ fn main() -> ExitCode {
         (Some(Command::Scenes), _) => scenes::list(),
         (Some(Command::Export(args)), _) => scenes::export(args),
         (Some(Command::Compare(args)), _) => compare::run(args),
+        (Some(Command::Bench(args)), _) => bench::run(args),
         (Some(Command::Points(args)), _) => points::run(args),
         (None, _) => {
             eprintln!("{GREETING}");

@@ -143,7 +143,7 @@ fn registration(args: &RegisterArgs) -> Result<()> {
 
 fn report(found: &Registration) {
     for row in found.motion.rows() {
-        crate::print(&row.map(|x| format!("{x:>22.15e}")).join(" "));
+        crate::print(&row.map(|x| format!("{x:>23.16e}")).join(" "));
     }
     let Some(last) = found.iterations.last() else { return };
     let plane = last.plane_rms.map_or(String::new(), |rms| format!("\nplane rms  {}", digits(rms)));

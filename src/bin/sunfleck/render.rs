@@ -30,7 +30,7 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode> {
     let mut stages = timed(&mut seconds.prepare, || device.stages(&input))?; // scene → device's memory
     let stages = &mut *stages;
     let radii = timed(&mut seconds.start, || start(stages, &input.params, job.one_radius))?; // first photons → radii
-    let mut run = Run::new(&job, args, &input, device.backend(), stages, Radii::of(&radii), seconds);
+    let mut run = Run::new(&job, args, &input, &device, stages, Radii::of(&radii), seconds);
     if args.verbose {
         run.describe(&input, &progress);
     }
@@ -63,7 +63,7 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode> {
 }
 
 /// Runs the pilot; for one radius everywhere, again with the median of what it chose.
-fn start(stages: &mut dyn Stages, params: &Params, one_radius: bool) -> Result<Vec<f32>> {
+pub fn start(stages: &mut dyn Stages, params: &Params, one_radius: bool) -> Result<Vec<f32>> {
     let radii = ppm::start(stages, params)?;
     if !one_radius {
         return Ok(radii);
@@ -107,7 +107,7 @@ impl<'a> Run<'a> {
         job: &'a Job,
         args: &'a RenderArgs,
         input: &'a Input,
-        backend: &'static str,
+        device: &devices::Device,
         stages: &dyn Stages,
         radii: Radii,
         seconds: Seconds,
@@ -117,7 +117,12 @@ impl<'a> Run<'a> {
             sunfleck: output::VERSION,
             scene: job.scene_name.clone(),
             settings: Settings::new(params, job.budget),
-            device: Device { backend, name: stages.device(), threads: rayon::current_num_threads() },
+            device: Device {
+                backend: device.backend(),
+                name: stages.device(),
+                index: device.index(),
+                threads: rayon::current_num_threads(),
+            },
             end: End::Failed,
             error: None,
             seconds,
@@ -300,7 +305,10 @@ impl<'a> Run<'a> {
                 if scene.environment.is_some() { ", environment" } else { "" },
             ),
             format!("camera: {:?}, {width}x{height} pixels", input.camera.name),
-            format!("device: {} ({})", self.report.device.name, self.report.device.backend),
+            format!(
+                "device: {} ({}), index: {}",
+                self.report.device.name, self.report.device.backend, self.report.device.index
+            ),
             format!("photons: {} paths an iteration, alpha {:.4}, {:?}", params.n_paths, params.alpha, params.kernel),
             format!(
                 "first radius: {}, from {} to {}",
@@ -327,7 +335,7 @@ fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
 }
 
 /// As it could be typed again.
-fn command_line() -> String {
+pub fn command_line() -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_=./,:+%@".contains(c);
     let quote = |arg: String| match arg.chars().all(plain) && !arg.is_empty() {
         true => arg,

@@ -90,6 +90,8 @@ pub struct Device {
     pub backend: &'static str,
     /// As the backend names it.
     pub name: String,
+    /// What finds the photons: `tree` or `hardware`.
+    pub index: String,
     /// Threads of the CPU.
     pub threads: usize,
 }

@@ -10,10 +10,12 @@ use photons::PhotonPaths;
 pub use probe::{BsdfAnswer, BsdfQuery};
 use scene::SceneBuffers;
 
+use super::Method;
 use super::buffers::{Array, Readback};
 use super::context::Context;
+use super::hardware::Hardware;
 use super::index::{Index, Sorted};
-use super::kernels::{Access, Batch, Kernel, Modules, Shared};
+use super::kernels::{ACCELERATION_STRUCTURE, Access, Batch, Kernel, Modules, Shared};
 use super::timer::Timer;
 use crate::layout::{Camera, EyeVertex, Frame, Photon, PointBox};
 use crate::ppm::{Error, Film, StageTimes, Stages};
@@ -49,10 +51,14 @@ pub struct GpuStages {
     trace_eye: Arc<Kernel>,
     paths: PhotonPaths,
     index: Index,
+    /// What searches instead of the index's tree; the photons are in its order all the same.
+    hardware: Option<Hardware>,
     gather: Arc<Kernel>,
     accumulate: Arc<Kernel>,
     eye_vertices: Array,
     first_radii: Array,
+    /// The largest of them, metres, and its pixel.
+    largest_radius: (f32, usize),
     radiance: Array,
     film: Array,
     photons: Array,
@@ -73,6 +79,16 @@ pub struct GpuStages {
 impl GpuStages {
     /// Puts the scene on the device.
     pub fn new(context: Arc<Context>, scene: &PackedScene, camera: Camera) -> Result<Self, Error> {
+        Self::with_method(context, scene, camera, Method::Tree)
+    }
+
+    /// The same; `method` finds the photons around an eye vertex.
+    pub fn with_method(
+        context: Arc<Context>,
+        scene: &PackedScene,
+        camera: Camera,
+        method: Method,
+    ) -> Result<Self, Error> {
         use Access::{Read, Write};
         let (scene, groups) = SceneBuffers::new(&context, scene, &camera)?;
         let shared = Shared::new(&context, groups);
@@ -80,7 +96,14 @@ impl GpuStages {
         let trace_eye = modules.kernel("eye", "trace_eye", &[Write])?;
         let paths = PhotonPaths::new(&modules)?;
         let index = Index::new(&modules, &Sorted { permute: ("permute", "permute"), words: PHOTON_WORDS })?;
-        let gather = modules.kernel("gather", "gather", &[Read, Read, Read, Read, Write])?;
+        let (gather, hardware) = match method {
+            Method::Tree => (modules.kernel("gather", "gather", &[Read, Read, Read, Read, Write])?, None),
+            Method::Hardware => {
+                let hardware = Hardware::new(&context, &modules)?;
+                let bindings = [Read.into(), Read.into(), Read.into(), ACCELERATION_STRUCTURE, Write.into()];
+                (modules.kernel("gather_hardware", "gather", &bindings)?, Some(hardware))
+            }
+        };
         let accumulate = modules.kernel("accumulate", "accumulate", &[Read, Write])?;
         let timer = Timer::new(&context);
         Ok(Self {
@@ -91,10 +114,12 @@ impl GpuStages {
             trace_eye,
             paths,
             index,
+            hardware,
             gather,
             accumulate,
             eye_vertices: Array::in_ranges::<EyeVertex>("eye vertices"),
             first_radii: Array::in_ranges::<f32>("first radii"),
+            largest_radius: (0.0, 0),
             radiance: Array::in_ranges::<[f32; 4]>("radiance"),
             film: Array::in_ranges::<[f32; 4]>("film"),
             photons: Array::new::<Photon>("photons"),
@@ -126,7 +151,7 @@ impl GpuStages {
         (0..height).step_by(rows as usize).map(move |first| (first, rows.min(height - first)))
     }
 
-    /// The boxes of the tree, all levels, leaves first.
+    /// The boxes of the tree, all levels, leaves first; none where ray queries search.
     pub fn tree(&mut self) -> Result<Vec<PointBox>, Error> {
         let n = self.index.levels.last().map_or(0, |[first, n]| first + n);
         self.read(Source::Boxes, n)
@@ -218,11 +243,27 @@ impl Stages for GpuStages {
         let n = self.n_photons;
         self.photons.reserve(&self.context, u64::from(n))?;
         self.other_photons.reserve(&self.context, self.photons.capacity())?;
-        self.index.reserve(&self.context, n)?;
+        match &mut self.hardware {
+            None => self.index.reserve(&self.context, n)?,
+            Some(hardware) => {
+                self.index.reserve_sort(&self.context, n)?;
+                hardware.reserve(&self.context, n)?;
+            }
+        }
         self.scene.set_frame(&self.context, frame);
         let mut batch = Batch::new(&self.context, &self.shared, "build");
         self.timer.begin(BUILD, &mut batch);
-        self.index.build(&mut batch, n, &self.photons.all(), PHOTON_WORDS, &self.other_photons);
+        let photons = self.photons.all();
+        match &mut self.hardware {
+            None => self.index.build(&mut batch, n, &photons, PHOTON_WORDS, &self.other_photons),
+            Some(hardware) => {
+                if n > 0 {
+                    self.index.sort(&mut batch, n, &photons, PHOTON_WORDS, &self.other_photons);
+                }
+                let radius = self.largest_radius.0 * frame.radius_scale;
+                hardware.build(&mut batch, n, &self.other_photons, PHOTON_WORDS, radius);
+            }
+        }
         self.timer.end(BUILD, batch, &self.context)?;
         std::mem::swap(&mut self.photons, &mut self.other_photons);
         Ok(())
@@ -230,8 +271,17 @@ impl Stages for GpuStages {
 
     fn gather(&mut self, frame: &Frame) -> Result<(), Error> {
         self.check_pixels(frame)?;
-        self.index.reserve(&self.context, 0)?;
         self.photons.reserve(&self.context, 0)?;
+        let tree = match &self.hardware {
+            None => {
+                self.index.reserve(&self.context, 0)?;
+                self.index.nodes.all()
+            }
+            Some(hardware) => {
+                let (largest, query) = self.largest_radius;
+                hardware.tree(&self.context, query, largest * frame.radius_scale)?
+            }
+        };
         self.scene.set_frame(&self.context, frame);
         let mut batch = Batch::new(&self.context, &self.shared, "gather");
         self.timer.begin(GATHER, &mut batch);
@@ -245,7 +295,7 @@ impl Stages for GpuStages {
                 self.eye_vertices.range(first, n),
                 self.first_radii.range(first, n),
                 self.photons.all(),
-                self.index.nodes.all(),
+                tree.clone(),
                 self.radiance.range(first, n),
             ];
             let arguments = self.index.arguments([rows, self.n_photons, self.index.levels.len() as u32, 0]);
@@ -275,6 +325,8 @@ impl Stages for GpuStages {
 
     fn set_first_radii(&mut self, radii: &[f32]) -> Result<(), Error> {
         self.reserve_pixels(radii.len() as u32)?;
+        let larger = |a: (f32, usize), b: (f32, usize)| if b.0 > a.0 { b } else { a };
+        self.largest_radius = radii.iter().copied().zip(0..).fold((0.0, 0), larger);
         self.first_radii.write(&self.context, radii)
     }
 

@@ -30,7 +30,7 @@ const WRITE: u32 = 1;
 impl PointSearch {
     /// Number of neighbours of each query. Many queries are searched in several parts.
     pub fn count_all(&mut self, queries: &[Vec3], radii: Radii<'_>) -> Result<Vec<u32>, Error> {
-        radii.check(queries, f32::INFINITY)?;
+        radii.check(queries, self.max_radius())?;
         let mut counts = Vec::with_capacity(queries.len());
         for (queries, radii) in parts(queries, radii, self.most_queries(size_of::<Vec3>())) {
             counts.append(&mut self.count_on_device(queries.into(), radii.into())?.download()?);
@@ -41,7 +41,7 @@ impl PointSearch {
     /// All neighbours of all queries, sized by counting first. Where there are more than one binding of the device holds,
     /// the queries are searched in several parts.
     pub fn neighbours_all(&mut self, queries: &[Vec3], radii: Radii<'_>) -> Result<Neighbours, Error> {
-        radii.check(queries, f32::INFINITY)?;
+        radii.check(queries, self.max_radius())?;
         let mut all = Neighbours { offsets: vec![0], ..Neighbours::default() };
         for (queries, radii) in parts(queries, radii, self.most_queries(size_of::<Vec3>())) {
             self.append_neighbours(queries, radii, &mut all)?;
@@ -82,7 +82,7 @@ impl PointSearch {
     /// Truncated k-NN of all queries; `k` from 1 to [`MAX_K`]. Many queries are searched in several parts.
     pub fn nearest_all(&mut self, queries: &[Vec3], radii: Radii<'_>, k: usize) -> Result<NearestLists, Error> {
         check_k(k)?;
-        radii.check(queries, f32::INFINITY)?;
+        radii.check(queries, self.max_radius())?;
         let mut lists = NearestLists { k, ..NearestLists::default() };
         for (queries, radii) in parts(queries, radii, self.most_queries((8 * k).max(size_of::<Vec3>()))) {
             let mut part = self.nearest_on_device(queries.into(), radii.into(), k)?.download()?;
@@ -135,7 +135,8 @@ impl PointSearch {
             indices: self.array("nearest points", n * k as u64)?,
             distances2: self.array("their distances", n * k as u64)?,
         };
-        let boxes = self.index.boxes.raw().clone();
+        // Ray queries have no boxes to tell; those are not read then.
+        let boxes = if self.hardware.is_some() { &self.index.bounds } else { &self.index.boxes }.raw().clone();
         let own = [lists.found.all(), lists.indices.all(), lists.distances2.all(), boxes.as_entire_binding()];
         let kernel = self.nearest.clone();
         self.launch(SEARCH, &kernel, &set, &own, k as u32)?;
@@ -222,7 +223,12 @@ impl PointSearch {
         option: u32,
     ) -> Result<(), Error> {
         let n = set.records.n;
-        let mut buffers = vec![self.points.all(), self.index.nodes.all(), set.records.binding(), set.radii_binding()];
+        // Radii have been checked, as far as they can be.
+        let tree = match &self.hardware {
+            None => self.index.nodes.all(),
+            Some(hardware) => hardware.tree(&self.context, 0, 0.0)?,
+        };
+        let mut buffers = vec![self.points.all(), tree, set.records.binding(), set.radii_binding()];
         buffers.extend_from_slice(own);
         let levels = self.index.levels.len() as u32;
         let mut batch = Batch::new(&self.context, &self.shared, "search");

@@ -19,10 +19,12 @@ pub use queries::{Queries, QueryRadii};
 pub use results::{DeviceArray, DeviceNearest, DeviceNeighbours};
 pub use visitor::Visitor;
 
+use super::Method;
 use super::buffers::{Array, Readback};
 use super::context::Context;
+use super::hardware::Hardware;
 use super::index::{Index, Sorted};
-use super::kernels::{Access, Batch, Kernel, Modules, Shared};
+use super::kernels::{ACCELERATION_STRUCTURE, Access, Batch, Kernel, Modules, Shared};
 use super::timer::Timer;
 use crate::device::Error;
 use crate::index::{self, check_points};
@@ -30,6 +32,9 @@ use crate::layout::{PointBox, TreeNode};
 
 /// Words of a point in the order of the tree: position, index.
 const WORDS: u32 = 4;
+
+/// Binding of the tree in `shaders/lib/search.wgsl`.
+const TREE: usize = 1;
 
 // The stages that are timed.
 const BUILD: usize = 0;
@@ -55,6 +60,10 @@ pub struct PointSearch {
     context: Arc<Context>,
     shared: Arc<Shared>,
     index: Index,
+    /// What is searched instead of the index's tree.
+    hardware: Option<Hardware>,
+    /// Of the next build, and of the last.
+    max_radius: [f32; 2],
     neighbours: Arc<Kernel>,
     scan_blocks: Arc<Kernel>,
     scan_sums: Arc<Kernel>,
@@ -76,19 +85,42 @@ pub struct PointSearch {
 impl PointSearch {
     /// Without points.
     pub fn new(context: Arc<Context>) -> Result<Self, Error> {
+        Self::with(context, Method::Tree, f32::INFINITY)
+    }
+
+    /// Without points, searched by the ray queries of a device that was opened for them
+    /// ([`Context::with_ray_queries`]). Queries have radii up to `max_radius`; the smaller that is, the faster they are.
+    /// Results are the same but for the order within a row, which the device chooses.
+    pub fn hardware(context: Arc<Context>, max_radius: f32) -> Result<Self, Error> {
+        Self::with(context, Method::Hardware, max_radius)
+    }
+
+    fn with(context: Arc<Context>, method: Method, max_radius: f32) -> Result<Self, Error> {
         use Access::{Read, Write};
+        check_max_radius(max_radius)?;
         let shared = Arc::new(Shared::new(&context, Vec::new()));
         let modules = Modules::new(&context, &shared);
         let index = Index::new(&modules, &Sorted { permute: ("points", "sort_points"), words: WORDS })?;
-        let neighbours = [Read, Read, Read, Read, Write, Read, Write, Write];
+        let mut neighbours = [Read, Read, Read, Read, Write, Read, Write, Write].map(wgpu::BindingType::from);
+        let mut nearest = [Read, Read, Read, Read, Write, Write, Write, Read].map(wgpu::BindingType::from);
+        let (modules_of_both, hardware) = match method {
+            Method::Tree => (["neighbours", "nearest"], None),
+            Method::Hardware => {
+                neighbours[TREE] = ACCELERATION_STRUCTURE;
+                nearest[TREE] = ACCELERATION_STRUCTURE;
+                (["neighbours_hardware", "nearest_hardware"], Some(Hardware::new(&context, &modules)?))
+            }
+        };
         let scan = [Read, Write, Write];
         let mut search = Self {
-            neighbours: modules.kernel("neighbours", "search", &neighbours)?,
+            neighbours: modules.kernel(modules_of_both[0], "search", &neighbours)?,
             scan_blocks: modules.kernel("scan", "scan_blocks", &scan)?,
             scan_sums: modules.kernel("scan", "scan_sums", &scan)?,
             scan_offsets: modules.kernel("scan", "scan_offsets", &scan)?,
-            nearest: modules.kernel("nearest", "search", &[Read, Read, Read, Read, Write, Write, Write, Read])?,
+            nearest: modules.kernel(modules_of_both[1], "search", &nearest)?,
             index,
+            hardware,
+            max_radius: [max_radius; 2],
             given: Array::new::<Vec3>("points"),
             points: Array::new::<[u32; 4]>("points in tree order"),
             n_points: 0,
@@ -102,7 +134,7 @@ impl PointSearch {
             shared,
             context,
         };
-        search.reserve(0)?;
+        search.build(&[])?;
         Ok(search)
     }
 
@@ -119,6 +151,20 @@ impl PointSearch {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.n_points == 0
+    }
+
+    /// The largest radius that may be asked for, infinite unless ray queries search.
+    pub fn max_radius(&self) -> f32 {
+        self.max_radius[1]
+    }
+
+    /// Sets the largest radius from the next build on. Without ray queries any radius may be asked for all the same.
+    pub fn set_max_radius(&mut self, max_radius: f32) -> Result<(), Error> {
+        check_max_radius(max_radius)?;
+        if self.hardware.is_some() {
+            self.max_radius[0] = max_radius;
+        }
+        Ok(())
     }
 
     /// Most points that fit one binding of this device; its memory may allow fewer.
@@ -146,7 +192,13 @@ impl PointSearch {
         if self.points.capacity() < u64::from(n.max(1)) {
             self.points.reserve(&self.context, roomy.max(u64::from(n)))?;
         }
-        self.index.reserve(&self.context, n)
+        match &mut self.hardware {
+            None => self.index.reserve(&self.context, n),
+            Some(hardware) => {
+                self.index.reserve_sort(&self.context, n)?;
+                hardware.reserve(&self.context, n)
+            }
+        }
     }
 
     /// Replaces the points. They must be finite. After an error there are none.
@@ -175,7 +227,17 @@ impl PointSearch {
         self.reserve_or_keep(records.n)?;
         let mut batch = Batch::new(&self.context, &self.shared, "build");
         self.timer.begin(BUILD, &mut batch);
-        self.index.build(&mut batch, records.n, &records.binding(), records.words, &self.points);
+        let n = records.n;
+        match &mut self.hardware {
+            None => self.index.build(&mut batch, n, &records.binding(), records.words, &self.points),
+            Some(hardware) => {
+                if n > 0 {
+                    self.index.sort(&mut batch, n, &records.binding(), records.words, &self.points);
+                }
+                self.max_radius[1] = self.max_radius[0];
+                hardware.build(&mut batch, n, &self.points, WORDS, self.max_radius[1]);
+            }
+        }
         self.timer.end(BUILD, batch, &self.context)?;
         self.n_points = records.n;
         Ok(())
@@ -187,7 +249,7 @@ impl PointSearch {
         self.sort_queries = sort;
     }
 
-    /// The boxes of the tree, all levels, leaves first.
+    /// The boxes of the tree, all levels, leaves first; none where ray queries search.
     pub fn boxes(&mut self) -> Result<Vec<PointBox>, Error> {
         let n = self.index.levels.last().map_or(0, |[first, n]| first + n) as usize;
         if n == 0 {
@@ -221,4 +283,8 @@ impl PointSearch {
         let [build, search, fill] = self.timer.read(&self.context, &self.shared, &mut self.readback)?;
         Ok(SearchTimes { build, search, fill })
     }
+}
+
+fn check_max_radius(radius: f32) -> Result<(), Error> {
+    Ok(index::Radii::One(radius).check(&[], f32::INFINITY)?)
 }

@@ -51,7 +51,7 @@ pub enum QueryRadii<'a> {
     /// From the host: checked to be zero or more, and uploaded.
     Host(Radii<'a>),
     /// On the device: one `f32` a query, usage `STORAGE`. They are not checked; within one that is negative or NaN there
-    /// is nothing.
+    /// is nothing, and within one above [`PointSearch::max_radius`] not all is found.
     Device(&'a wgpu::Buffer),
 }
 
@@ -135,19 +135,20 @@ impl PointSearch {
         let n = queries.len();
         let n32 = u32::try_from(n)
             .map_err(|_| Error::from(index::Error::Lengths { queries: n, radii: u32::MAX as usize }))?;
+        let max = self.max_radius();
         // Radii without queries, and queries without radii, are checked as well.
         match (queries, radii) {
-            (Queries::Host(queries), QueryRadii::Host(radii)) => radii.check(queries, f32::INFINITY)?,
-            (Queries::Host(queries), QueryRadii::Device(_)) => Radii::One(0.0).check(queries, f32::INFINITY)?,
+            (Queries::Host(queries), QueryRadii::Host(radii)) => radii.check(queries, max)?,
+            (Queries::Host(queries), QueryRadii::Device(_)) => Radii::One(0.0).check(queries, max)?,
             (Queries::Device { .. }, QueryRadii::Host(Radii::Each(radii))) if radii.len() != n => {
                 return Err(index::Error::Lengths { queries: n, radii: radii.len() }.into());
             }
             (Queries::Device { .. }, QueryRadii::Host(Radii::Each(radii))) => {
                 for &radius in radii {
-                    Radii::One(radius).check(&[], f32::INFINITY)?;
+                    Radii::One(radius).check(&[], max)?;
                 }
             }
-            (Queries::Device { .. }, QueryRadii::Host(radii)) => radii.check(&[], f32::INFINITY)?,
+            (Queries::Device { .. }, QueryRadii::Host(radii)) => radii.check(&[], max)?,
             (Queries::Device { .. }, QueryRadii::Device(_)) => {}
         }
         let records = match queries {

@@ -1,14 +1,14 @@
 //! A function of the user's own, in WGSL, for each neighbour.
 
-use super::super::kernels::{Access, Kernel, Modules};
+use super::super::kernels::{ACCELERATION_STRUCTURE, Access, Kernel, Modules};
 use super::super::shaders;
-use super::{PointSearch, Queries, QueryRadii, SEARCH};
+use super::{PointSearch, Queries, QueryRadii, SEARCH, TREE};
 use crate::device::Error;
 
 /// Bindings of the search itself; the user's come after them.
 const OWN_BINDINGS: u32 = 4;
 
-/// A compiled visitor, of the device it was compiled for.
+/// A compiled visitor, of the device and the method of search that it was compiled for.
 pub struct Visitor {
     kernel: Kernel,
     accesses: Vec<Access>,
@@ -41,11 +41,18 @@ impl PointSearch {
             let message = format!("{} buffers: {} allows {allowed}", buffers.len(), self.context.info());
             return Err(Error::Shader(message));
         }
-        let mut accesses = vec![Access::Read; OWN_BINDINGS as usize];
-        accesses.extend_from_slice(buffers);
+        let mut bindings = vec![wgpu::BindingType::from(Access::Read); OWN_BINDINGS as usize];
+        bindings.extend(buffers.iter().map(|&access| wgpu::BindingType::from(access)));
         // The user's text first, so that its lines keep their numbers: WGSL allows any order.
-        let source = format!("{wgsl}\n{}", shaders::compose("#import search\n"));
-        let kernel = Modules::new(&self.context, &self.shared).custom(source, "search", &accesses)?;
+        let source = match self.hardware {
+            None => format!("{wgsl}\n{}", shaders::compose("#import search\n")),
+            Some(_) => {
+                bindings[TREE] = ACCELERATION_STRUCTURE;
+                let search = shaders::compose_for_hardware("#import search\n");
+                format!("{}{wgsl}\n{search}", shaders::ENABLE_RAY_QUERIES)
+            }
+        };
+        let kernel = Modules::new(&self.context, &self.shared).custom(source, "search", &bindings)?;
         Ok(Visitor { kernel, accesses: buffers.to_vec() })
     }
 

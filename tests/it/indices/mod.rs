@@ -109,7 +109,7 @@ fn check_answers(name: &str, index: &impl RadiusSearch, what: &str, n: usize, qu
         });
         assert_eq!((left.break_value(), seen), ((stop_at <= row.len()).then_some(stop_at), stop_at.min(row.len())));
     }
-    for k in [1, 2, 7, 8, 9, 33, MAX_K] {
+    for k in [1, 2, 8, 33, MAX_K] {
         let lists = index.nearest_all(queries, each, k).unwrap();
         let mut one = Nearest::new(k);
         for (q, row) in expected.iter().enumerate() {
@@ -148,15 +148,15 @@ fn shapes() {
     for (shape, name) in SHAPES.into_iter().enumerate() {
         for (at, place) in PLACES.into_iter().enumerate() {
             let seed = (shape * 100 + at) as u32;
-            let points = cloud(shape, seed, 250 + 7 * at as u32, place);
+            let points = cloud(shape, seed, 120 + 7 * at as u32, place);
             let scale = place.0.abs();
             let mut found = 0;
-            for (built, n) in [(0.0, 40), (0.02, 80), (0.4, 80), (1.0, 40), (5.0, 20), (f32::INFINITY, 20)] {
+            for (built, n) in [(0.0, 20), (0.02, 40), (0.4, 40), (1.0, 40), (5.0, 10), (f32::INFINITY, 10)] {
                 let (queries, radii) = queries(&points, seed + 9, n, place.0, scale * built);
                 let what = format!("{name} × {} + {}, built for {built}", place.0, place.1);
                 found += check_all(&what, &points, scale * built, &queries, &radii);
             }
-            assert!(found > 100, "{name} × {} + {}: {found}", place.0, place.1);
+            assert!(found > 50, "{name} × {} + {}: {found}", place.0, place.1);
         }
     }
 }
@@ -256,7 +256,7 @@ fn what_is_refused() {
         for k in [0, MAX_K + 1] {
             assert_eq!(index.nearest_all(&[at], Radii::One(0.1), k).unwrap_err(), Error::K(k), "{name}");
         }
-        assert_eq!(index.count_all(&[], Radii::One(0.1)).unwrap(), Vec::<u32>::new(), "{name}");
+        assert!(index.count_all(&[], Radii::One(0.1)).unwrap().is_empty(), "{name}");
         assert!(index.neighbours_all(&[], Radii::Each(&[])).unwrap().is_empty(), "{name}");
     }
     for_every_index!(&points, 0.5, check);

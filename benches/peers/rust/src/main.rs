@@ -13,7 +13,7 @@ use kiddo::ImmutableKdTree;
 use peers::{Batch, Found, Obvhs, Peer, Single};
 use rustix::time::{ClockId, clock_gettime};
 use serde_json::json;
-use sunfleck::index::PointBvh;
+use sunfleck::index::{HashGrid, PointBvh};
 
 fn main() -> Result<()> {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -24,6 +24,7 @@ fn main() -> Result<()> {
             match library {
                 "sunfleck" => job.run::<Batch<PointBvh>>(library),
                 "sunfleck-single" => job.run::<Single<PointBvh>>(library),
+                "sunfleck-grid" => job.run::<Batch<HashGrid>>(library),
                 "kiddo" => job.run::<ImmutableKdTree<f32, 3>>(library),
                 "obvhs-ploc" => job.run::<Obvhs<false>>(library),
                 "obvhs-medium" => job.run::<Obvhs<true>>(library),

@@ -10,7 +10,7 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use rstar::RTree;
-use sunfleck::index::{Nearest, PointBvh, Radii, RadiusSearch, distance2};
+use sunfleck::index::{HashGrid, Nearest, PointBvh, Radii, RadiusSearch, distance2};
 
 /// What a query finds: how many, and the sum over them of the kernel 1 − d²/r², or for k-NN of the squared distances.
 #[derive(Clone, Copy, Debug, Default)]
@@ -60,6 +60,13 @@ impl Build for PointBvh {
     const ONE_RADIUS: bool = false;
     fn over(points: &[Vec3], _: f32) -> Self {
         Self::new(points).expect("finite points")
+    }
+}
+
+impl Build for HashGrid {
+    const ONE_RADIUS: bool = true;
+    fn over(points: &[Vec3], radius: f32) -> Self {
+        Self::new(points, radius).expect("finite points")
     }
 }
 

@@ -23,7 +23,7 @@ Examples:
   sunfleck points normals scan.xyz -k 12 -o normals.ply";
 
 #[derive(Debug, Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, arg_required_else_help = false)]
 pub struct PointsArgs {
     /// What to do.
     #[command(subcommand)]
