@@ -5,7 +5,7 @@
 use std::time::Instant;
 
 use glam::{Vec2, Vec3};
-use sunfleck::index::{HashGrid, PointBvh, Radii, RadiusSearch};
+use sunfleck::index::{HashGrid, Nearest, PointBvh, Radii, RadiusSearch};
 use sunfleck::math::{rng, warp};
 
 const HELP: &str = "\
@@ -93,13 +93,25 @@ fn run(o: &Options) {
     let tree = &PointBvh::new(&points).unwrap();
     let (queries, n) = (&queries, queries.len() as f64);
     let mut jobs: Vec<Job<'_>> = Vec::new();
-    for k in [1, 4, 8] {
+    for (radius, k) in [0.02, f32::INFINITY].into_iter().flat_map(|radius| [1, 4, 8].map(|k| (radius, k))) {
         jobs.push((
-            format!("k-NN, k = {k}"),
+            format!("k-NN, k = {k}, within {radius}"),
             n,
             Box::new(move || {
-                let lists = tree.nearest_all(queries, Radii::One(0.02), k).unwrap();
+                let lists = tree.nearest_all(queries, Radii::One(radius), k).unwrap();
                 lists.distances2.iter().filter(|d| d.is_finite()).map(|&d| f64::from(d)).sum()
+            }),
+        ));
+        jobs.push((
+            format!("k-NN, k = {k}, within {radius}, one by one"),
+            n,
+            Box::new(move || {
+                let mut nearest = Nearest::new(k);
+                let one = |&q: &Vec3| {
+                    tree.nearest(q, radius, &mut nearest);
+                    nearest.found().iter().map(|found| f64::from(found.distance2)).sum::<f64>()
+                };
+                queries.iter().map(one).sum()
             }),
         ));
     }

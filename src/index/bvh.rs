@@ -5,7 +5,7 @@
 //! Boxes are not grown by the radius: a query tests its ball against them, so one tree serves every radius, and k-NN can
 //! shrink its ball as it goes.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -43,6 +43,10 @@ pub struct PointBvh {
     pub(super) boxes: Vec<Octet>,
     /// First octet of each level.
     pub(super) levels: Vec<u32>,
+    /// Least corner, and Morton cells a unit of length along each axis.
+    grid: (Vec3, Vec3),
+    /// Upper half of the Morton key of each leaf's first point.
+    firsts: Vec<u32>,
     /// What is sorted, and room for it.
     words: Vec<u64>,
     other: Vec<u64>,
@@ -108,10 +112,8 @@ impl PointBvh {
             .fold(|| nothing, |(min, max), i| (min.min(point(i)), max.max(point(i))))
             .reduce(|| nothing, |a, b| (a.0.min(b.0), a.1.max(b.1)));
         let scale = (max - min).map(|extent| if extent > 0.0 { morton::CELLS / extent } else { 0.0 });
-        let key = |i: usize| {
-            let cell = ((point(i) - min) * scale).min(Vec3::splat(morton::CELLS - 1.0)).as_uvec3();
-            morton::interleave(cell.to_array())
-        };
+        self.grid = (min, scale);
+        let key = |i: usize| morton_key(point(i), min, scale);
         // The upper half of each key before the index; the few that agree in it are sorted by the whole key.
         let word = |i: usize| key(i) >> LOWER << 32 | i as u64;
         (0..n).into_par_iter().with_min_len(8192).map(word).collect_into_vec(&mut self.words);
@@ -123,6 +125,24 @@ impl PointBvh {
         }
         self.words.par_iter().with_min_len(8192).map(|&word| word as u32).collect_into_vec(&mut self.order);
         self.order.resize(n.next_multiple_of(WIDTH), u32::MAX);
+        let firsts = self.words.par_iter().step_by(WIDTH).with_min_len(8192);
+        firsts.map(|&word| (word >> 32) as u32).collect_into_vec(&mut self.firsts);
+    }
+
+    /// Leaves about the place that a point would have in Morton order: one, and more where `k` needs them.
+    #[inline]
+    pub(super) fn leaves_about(&self, p: Vec3, k: usize) -> Range<u32> {
+        let (min, scale) = self.grid;
+        let key = (morton_key(p, min, scale) >> LOWER) as u32;
+        let place = self.firsts.partition_point(|&first| first <= key).saturating_sub(1);
+        let more = k / WIDTH;
+        place.saturating_sub(more) as u32..(place + more + 1).min(self.leaves.len()) as u32
+    }
+
+    /// About how far points are apart if they fill the cube around them.
+    pub(super) fn spacing(&self) -> f32 {
+        let extent = self.grid.1.map(|scale| if scale > 0.0 { morton::CELLS / scale } else { 0.0 });
+        extent.max_element() / (self.n as f32).cbrt()
     }
 
     /// Index of the point in each slot: slots are what [`PointBvh::visit`] reports.
@@ -200,6 +220,13 @@ impl RadiusSearch for PointBvh {
     fn nearest_all(&self, queries: &[Vec3], radii: Radii<'_>, k: usize) -> Result<NearestLists, Error> {
         packet::nearest_all(self, queries, radii, k)
     }
+}
+
+/// Of a point in the grid, or of the cell nearest to it.
+#[inline]
+fn morton_key(p: Vec3, min: Vec3, scale: Vec3) -> u64 {
+    let cell = ((p - min) * scale).clamp(Vec3::ZERO, Vec3::splat(morton::CELLS - 1.0)).as_uvec3();
+    morton::interleave(cell.to_array())
 }
 
 fn union(boxes: &[(Vec3, Vec3)]) -> (Vec3, Vec3) {

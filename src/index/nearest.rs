@@ -41,6 +41,11 @@ impl Nearest {
         Self { k, found: 0, list: [Neighbour::NONE; MAX_K] }
     }
 
+    /// How many it takes.
+    pub fn k(&self) -> usize {
+        self.k
+    }
+
     /// Forgets what was inserted.
     pub fn clear(&mut self) {
         self.found = 0;

@@ -175,7 +175,7 @@ pub fn fold_all<T: Send>(
     visit_one: impl Fn(&mut T, u32, f32) + Sync,
 ) -> Result<Vec<T>, Error> {
     radii.check(queries, tree.max_radius())?;
-    let mut states: Vec<T> = (0..queries.len()).into_par_iter().with_min_len(4096).map(|i| start(i)).collect();
+    let mut states: Vec<T> = (0..queries.len()).into_par_iter().with_min_len(4096).map(&start).collect();
     let size = block_size(queries.len());
     states.par_chunks_mut(size).enumerate().for_each(|(block, states)| {
         let first = block * size;
@@ -222,7 +222,9 @@ pub fn nearest_all(tree: &PointBvh, queries: &[Vec3], radii: Radii<'_>, k: usize
     rows.zip(lists.found.par_chunks_mut(size)).enumerate().for_each(|(block, ((indices, distances2), found))| {
         let first = block * size;
         let query = |i: usize| (queries[first + i], radii.of(first + i));
-        let order = if is_coherent(found.len(), query) { None } else { Some(sorted(found.len(), query)) };
+        // Lists are short: queries further apart than points are have little in common, whatever their radius.
+        let close = |i: usize| (query(i).0, query(i).1.min(tree.spacing()));
+        let order = if is_coherent(found.len(), close) { None } else { Some(sorted(found.len(), close)) };
         let at = |i: usize| order.as_ref().map_or(i, |order| order[i] as u32 as usize);
         walk::nearest(
             tree,

@@ -212,7 +212,9 @@ impl<Q: Fn(usize) -> (Vec3, f32), R: FnMut(usize, &Nearest)> Task for NearestOf<
 /// Of a level: octet, children still to be entered, and the squared distances of all.
 type Pending = (u32, u8, [f32; WIDTH]);
 
-/// Nearer children first; each is entered only if its box is still near enough when its turn comes.
+/// First the leaves about the centre's place in Morton order, for a bound: of several boxes that hold the centre, the
+/// nearest may well have no point near it. Then nearer children first; each is entered only if its box is still near
+/// enough when its turn comes.
 #[inline(always)]
 fn nearest_one<L: Lanes>(
     on: L,
@@ -225,9 +227,13 @@ fn nearest_one<L: Lanes>(
     let Some(top) = tree.levels.len().checked_sub(1) else { return };
     let radius2 = radius2(radius);
     let reach = Reach::new(on, centre, centre, radius2);
-    let mut level = top;
-    pending[top] = reach.enter(on, tree, top, 0, radius2);
     let mut bound = radius2;
+    let seeds = tree.leaves_about(centre, nearest.k());
+    for leaf in seeds.clone() {
+        bound = nearest_in_leaf(on, tree, leaf, &reach, bound, nearest).min(radius2);
+    }
+    let mut level = top;
+    pending[top] = reach.enter(on, tree, top, 0, bound);
     loop {
         let (octet, bits, d2) = &mut pending[level];
         let (least, child) = on.least(*bits, on.load(d2));
@@ -245,14 +251,29 @@ fn nearest_one<L: Lanes>(
             pending[level] = reach.enter(on, tree, level, child, bound);
             continue;
         }
-        let d2 = distance2(on, &tree.leaves[child as usize].0.each_ref().map(|c| &c.0), &reach.min);
-        let mut inside = on.le(d2, on.splat(bound));
-        let d2 = on.store(d2);
-        while inside != 0 {
-            let i = inside.trailing_zeros();
-            inside &= inside - 1;
-            nearest.insert(tree.order[(child * LEAF_SIZE + i) as usize], d2[i as usize]);
+        if !seeds.contains(&child) {
+            bound = nearest_in_leaf(on, tree, child, &reach, bound, nearest).min(radius2);
         }
-        bound = nearest.bound().min(radius2);
     }
+}
+
+/// Takes the points of a leaf that are within √bound; the new bound.
+#[inline(always)]
+fn nearest_in_leaf<L: Lanes>(
+    on: L,
+    tree: &PointBvh,
+    leaf: u32,
+    reach: &Reach<L>,
+    bound: f32,
+    nearest: &mut Nearest,
+) -> f32 {
+    let d2 = distance2(on, &tree.leaves[leaf as usize].0.each_ref().map(|c| &c.0), &reach.min);
+    let mut inside = on.le(d2, on.splat(bound));
+    let d2 = on.store(d2);
+    while inside != 0 {
+        let i = inside.trailing_zeros();
+        inside &= inside - 1;
+        nearest.insert(tree.order[(leaf * LEAF_SIZE + i) as usize], d2[i as usize]);
+    }
+    nearest.bound()
 }

@@ -73,7 +73,7 @@ fn plane_normal(points: impl Iterator<Item = DVec3> + Clone, width: f64) -> Opti
     let (n, sum) = points.clone().fold((0, DVec3::ZERO), |(n, sum), p| (n + 1, sum + p));
     let mean = sum / f64::from(n);
     let size = points.clone().map(|p| (p - mean).abs().max_element()).fold(0.0, f64::max);
-    if !(size > 0.0) {
+    if size.is_nan() || size <= 0.0 {
         return None;
     }
     let mut m = [0.0; 6];

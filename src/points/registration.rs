@@ -184,7 +184,7 @@ fn fit_planes(pairs: &[Pair]) -> Result<(Rigid, usize), Error> {
     let first = pairs.first().ok_or(Error::Undetermined)?.from;
     let mean = first + chunked(pairs, DVec3::ZERO, |a, b| a + b, |pair| pair.from - first) / n;
     let spread = (chunked(pairs, 0.0, |a, b| a + b, |pair| pair.from.distance_squared(mean)) / n).sqrt();
-    if !(spread > 0.0) {
+    if spread.is_nan() || spread <= 0.0 {
         return Err(Error::Undetermined);
     }
     // The matrix's 36 entries, then the right-hand side's 6.

@@ -88,7 +88,7 @@ pub fn fit(pairs: &[(DVec3, DVec3)]) -> Result<Rigid, Error> {
         },
     );
     let size = covariance.to_cols_array().into_iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-    if !(size > 0.0) {
+    if size.is_nan() || size <= 0.0 {
         return Err(Error::Undetermined);
     }
     // Columns of glam's are columns of nalgebra's.

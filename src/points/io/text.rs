@@ -114,7 +114,7 @@ fn number(word: &str) -> Result<f64, String> {
 }
 
 pub(super) fn position(p: [f64; 3]) -> Result<DVec3, String> {
-    match p.iter().position(|c| !(c.abs() <= MAX_COORDINATE)) {
+    match p.iter().position(|c| c.is_nan() || c.abs() > MAX_COORDINATE) {
         Some(axis) => Err(format!("{} is {}", ["x", "y", "z"][axis], p[axis])),
         None => Ok(DVec3::from_array(p)),
     }
