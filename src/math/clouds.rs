@@ -121,6 +121,6 @@ fn wall(direction: Vec3) -> f32 {
 pub fn shuffle<T>(items: &mut [T], seed: u32) {
     for i in (1..items.len()).rev() {
         let [bits, ..] = draw(Set::Order, i, 0, seed);
-        items.swap(i, (u64::from(bits) * (i as u64 + 1) >> 32) as usize);
+        items.swap(i, ((u64::from(bits) * (i as u64 + 1)) >> 32) as usize);
     }
 }
