@@ -352,7 +352,7 @@ fn print(machine: &Machine, plan: &Plan, cells: &[Cell]) {
             let mut line = vec![scene.clone(), short(paths as usize)];
             for cell in cells.iter().filter(|c| c.scene == *scene && c.paths == paths) {
                 if line.len() == 2 {
-                    line.push(short(cell.stored.round() as usize));
+                    line.push(short(100 * (cell.stored / 100.0).round() as usize));
                 }
                 if lines.is_empty() {
                     header.push(cell.name());
