@@ -118,7 +118,7 @@ pub fn assert_same_sets(
     assert_eq!((found.offsets[0], found.offsets[queries.len()]), (0, found.indices.len()), "{name}: offsets");
     assert_eq!(found.distances2.len(), found.indices.len(), "{name}: distances");
     let mut n_differences = 0;
-    for q in 0..queries.len() {
+    for (q, &query) in queries.iter().enumerate() {
         let sorted = |all: &Neighbours| {
             let mut row: Vec<_> = all.row(q).map(|n| (n.index, n.distance2)).collect();
             row.sort_unstable_by_key(|n| n.0);
@@ -132,7 +132,7 @@ pub fn assert_same_sets(
         assert!(!exact, "{name}, query {q}: {} found, {} expected, or other distances", ours.len(), theirs.len());
         let radius2 = radii.of(q) * radii.of(q);
         for &(i, d2) in &ours {
-            let at_host = index::distance2(points[i as usize], queries[q]);
+            let at_host = index::distance2(points[i as usize], query);
             assert!((d2 - at_host).abs() <= BAND * at_host, "{name}, query {q}, point {i}: {d2} against {at_host}");
         }
         let lacks = |a: &[(u32, f32)], b: &[(u32, f32)]| {

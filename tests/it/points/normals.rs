@@ -19,7 +19,7 @@ fn normals(cloud: &[DVec3], k: usize) -> (Vec<Vec3>, usize) {
 fn errors(found: &[Vec3], truth: impl Iterator<Item = DVec3>) -> (f64, f64, usize) {
     let angles: Vec<f64> = found.iter().zip(truth).map(|(n, t)| n.as_dvec3().angle_between(t).to_degrees()).collect();
     let mean = angles.iter().sum::<f64>() / angles.len() as f64;
-    let wrong = angles.iter().filter(|a| !(**a < 90.0)).count();
+    let wrong = angles.iter().filter(|a| a.is_nan() || **a >= 90.0).count();
     (mean, angles.into_iter().fold(0.0, f64::max), wrong)
 }
 

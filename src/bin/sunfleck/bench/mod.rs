@@ -189,7 +189,7 @@ fn count(text: &str) -> Result<usize, String> {
 fn short(n: usize) -> String {
     match n {
         0..1000 => n.to_string(),
-        1000..100_000 if n % 100 != 0 => n.to_string(),
+        1000..100_000 if !n.is_multiple_of(100) => n.to_string(),
         1000..1_000_000 => format!("{}K", n as f64 / 1e3),
         _ => format!("{}M", n as f64 / 1e6),
     }

@@ -56,8 +56,11 @@ pub fn table_1(scene: &str, paths: u32) -> Option<Both> {
     Some(row.1[TABLE_1_PATHS.iter().position(|&p| p == paths)?])
 }
 
-/// Figure 7, milliseconds: points, build (k = 1, then k = 4 and 8), search (k = 1, 4, 8); OptiX before FLANN.
-pub const FIGURE_7: [(usize, [[f64; 2]; 2], [[f64; 2]; 3]); 4] = [
+/// Points, build (k = 1, then k = 4 and 8), search (k = 1, 4, 8).
+type Row7 = (usize, [[f64; 2]; 2], [[f64; 2]; 3]);
+
+/// Figure 7, milliseconds; OptiX before FLANN.
+pub const FIGURE_7: [Row7; 4] = [
     (100_000, [[1.4, 21.4], [2.4, 26.2]], [[0.1, 0.4], [0.2, 0.7], [0.5, 0.9]]),
     (350_000, [[3.3, 29.1], [4.9, 37.4]], [[0.2, 0.7], [1.0, 1.7], [1.9, 2.6]]),
     (500_000, [[4.5, 35.2], [6.5, 42.4]], [[0.3, 0.9], [1.6, 2.6], [3.4, 3.7]]),

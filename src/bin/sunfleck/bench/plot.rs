@@ -60,9 +60,12 @@ pub struct Bars {
     pub y: &'static str,
     /// What is stacked, from below.
     pub parts: Vec<&'static str>,
-    /// Name, and its bars: name and a height for each part.
-    pub groups: Vec<(String, Vec<(String, Vec<f64>)>)>,
+    /// Name, and its bars.
+    pub groups: Vec<(String, Vec<Bar>)>,
 }
+
+/// Name, and a height for each part.
+pub type Bar = (String, Vec<f64>);
 
 /// Panels side by side, `columns` in a row, drawn by `panel`.
 fn draw<T>(
