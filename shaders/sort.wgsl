@@ -16,8 +16,6 @@
 
 const DIGITS: u32 = 128u;
 const THREADS: u32 = 64u;
-const PER_THREAD: u32 = 32u;
-const BLOCK: u32 = THREADS * PER_THREAD;
 
 fn digit_of(key: vec2<u32>, shift: u32) -> u32 {
     if shift >= 32u {
@@ -30,7 +28,7 @@ fn digit_of(key: vec2<u32>, shift: u32) -> u32 {
 
 var<workgroup> histogram: array<atomic<u32>, DIGITS>;
 
-// Reads keys, writes counts; one workgroup per block. values: keys, shift, blocks.
+// Reads keys, writes counts; one workgroup per block. values: keys, shift, blocks, keys a thread takes.
 @compute @workgroup_size(64)
 fn sort_count(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -44,8 +42,9 @@ fn sort_count(
     atomicStore(&histogram[local], 0u);
     atomicStore(&histogram[local + THREADS], 0u);
     workgroupBarrier();
-    for (var j = 0u; j < PER_THREAD; j++) {
-        let i = block * BLOCK + j * THREADS + local;
+    let per_thread = arguments.values.w;
+    for (var j = 0u; j < per_thread; j++) {
+        let i = (block * per_thread + j) * THREADS + local;
         if i < n {
             atomicAdd(&histogram[digit_of(keys[i], shift)], 1u);
         }
@@ -74,7 +73,7 @@ fn prefix(local: u32, value: u32) -> u32 {
     return partial[local] - value;
 }
 
-// Reads and writes counts, writes totals; one workgroup per digit. values: keys, shift, blocks.
+// Reads and writes counts, writes totals; one workgroup per digit. values: keys, shift, blocks, keys a thread takes.
 @compute @workgroup_size(64)
 fn sort_scan(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) local: u32) {
     let n_blocks = arguments.values.z;
@@ -102,7 +101,7 @@ fn sort_scan(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocat
 var<workgroup> ranks: array<u32, THREADS * THREADS>;
 var<workgroup> bases: array<u32, DIGITS>;
 
-// Reads keys, order, counts and totals, writes keys_out and order_out; one workgroup per block. values: keys, shift, blocks.
+// Reads keys, order, counts and totals, writes keys_out and order_out; one workgroup per block. values: keys, shift, blocks, keys a thread takes.
 @compute @workgroup_size(64)
 fn sort_scatter(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -124,8 +123,9 @@ fn sort_scatter(
     bases[2u * local + 1u] = smaller + even + counts[(2u * local + 1u) * n_blocks + in_blocks];
     workgroupBarrier();
 
-    let begin = min(block * BLOCK + local * PER_THREAD, n);
-    let end = min(begin + PER_THREAD, n);
+    let per_thread = arguments.values.w;
+    let begin = min((block * THREADS + local) * per_thread, n);
+    let end = min(begin + per_thread, n);
     for (var i = begin; i < end; i++) {
         let digit = digit_of(keys[i], shift);
         ranks[local * THREADS + digit / 2u] += 1u << (16u * (digit & 1u));

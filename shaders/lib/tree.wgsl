@@ -73,8 +73,17 @@ fn walk(visitor: ptr<function, Visitor>, centre: vec3<f32>, n_points: u32, n_lev
         }
         let first = (k * FANOUT + firstTrailingBit(pending)) * LEAF_SIZE;
         pending &= pending - 1u;
-        let end = min(first + LEAF_SIZE, n_points);
-        for (var slot = first; slot < end; slot++) {
+        // First which points, then what is done with them: neighbouring threads mostly find others of the eight.
+        let present = min(LEAF_SIZE, n_points - first);
+        var found = 0u;
+        for (var i = 0u; i < present; i++) {
+            let delta = position_of(first + i) - centre;
+            let distance2 = delta.x * delta.x + delta.y * delta.y + delta.z * delta.z;
+            found |= select(0u, 1u << i, distance2 <= (*visitor).radius2);
+        }
+        while found != 0u {
+            let slot = first + firstTrailingBit(found);
+            found &= found - 1u;
             let delta = position_of(slot) - centre;
             let distance2 = delta.x * delta.x + delta.y * delta.y + delta.z * delta.z;
             if distance2 <= (*visitor).radius2 {

@@ -3,13 +3,16 @@
 use std::sync::Arc;
 
 use super::buffers::Array;
-use super::context::Context;
+use super::context::{Context, DeviceKind};
 use super::kernels::{Access, Arguments, Batch, Kernel, Modules};
 use crate::device::Error;
 use crate::layout::{FANOUT, LEAF_SIZE, PointBox, TreeNode};
 
-/// Points a workgroup of `bounds.wgsl` and `sort.wgsl` handles: `BLOCK` there.
+/// Points a workgroup of `bounds.wgsl` handles: `BLOCK` there.
 const BLOCK: u32 = 2048;
+/// Keys a thread of `sort.wgsl` takes, at most 1023 for its 16-bit counters: hardware wants many workgroups, software few,
+/// for each costs it a pass over its counters.
+const KEYS_A_THREAD: [u32; 2] = [32, 128];
 /// Bits of a digit in `sort.wgsl`.
 const DIGIT_BITS: u32 = 7;
 /// Digits of a 63-bit key.
@@ -41,6 +44,7 @@ pub(super) struct Sorted {
 
 /// Kernels and memory of the build.
 pub(super) struct Index {
+    keys_a_thread: u32,
     bounds_of_blocks: Arc<Kernel>,
     bounds_of_all: Arc<Kernel>,
     morton_keys: Arc<Kernel>,
@@ -70,7 +74,9 @@ impl Index {
         use Access::{Read, Write};
         let bounds = [Read, Write, Write];
         let sort = [Read, Read, Write, Write, Write, Write];
+        let software = modules.context().info().kind == DeviceKind::Cpu;
         Ok(Self {
+            keys_a_thread: KEYS_A_THREAD[usize::from(software)],
             bounds_of_blocks: modules.kernel("bounds", "bounds_of_blocks", &bounds)?,
             bounds_of_all: modules.kernel("bounds", "bounds_of_all", &bounds)?,
             morton_keys: modules.kernel("morton", "morton_keys", &[Read, Read, Write, Write])?,
@@ -107,6 +113,7 @@ impl Index {
         let (n, roomy) = (u64::from(n), roomy(n));
         let room = |array: &mut Array, needed: u64, roomy: u64| room(context, array, needed, roomy);
         let n_blocks = |n: u64| n.div_ceil(u64::from(BLOCK));
+        let n_sorted = |n: u64| n.div_ceil(u64::from(THREADS * self.keys_a_thread));
         room(&mut self.blocks, n_blocks(n), n_blocks(roomy))?;
         room(&mut self.bounds, 1, 1)?;
         for i in 0..2 {
@@ -114,7 +121,7 @@ impl Index {
             room(&mut self.order[i], n, roomy)?;
         }
         let digits = 1 << DIGIT_BITS;
-        room(&mut self.counts, digits * n_blocks(n), digits * n_blocks(roomy))?;
+        room(&mut self.counts, digits * n_sorted(n), digits * n_sorted(roomy))?;
         room(&mut self.totals, digits, digits)
     }
 
@@ -154,6 +161,7 @@ impl Index {
         sorted: &Array,
     ) {
         let n_blocks = n.div_ceil(BLOCK);
+        let n_sorted = n.div_ceil(THREADS * self.keys_a_thread);
         let groups = n.div_ceil(THREADS);
         let bounds = [records.clone(), self.blocks.all(), self.bounds.all()];
         batch.dispatch(&self.bounds_of_blocks, &bounds, [n, words, 0, 0], n_blocks);
@@ -171,10 +179,10 @@ impl Index {
                 self.counts.all(),
                 self.totals.all(),
             ];
-            let arguments = [n, pass * DIGIT_BITS, n_blocks, 0];
-            batch.dispatch(&self.sort_count, &buffers, arguments, n_blocks);
+            let arguments = [n, pass * DIGIT_BITS, n_sorted, self.keys_a_thread];
+            batch.dispatch(&self.sort_count, &buffers, arguments, n_sorted);
             batch.dispatch(&self.sort_scan, &buffers, arguments, 1 << DIGIT_BITS);
-            batch.dispatch(&self.sort_scatter, &buffers, arguments, n_blocks);
+            batch.dispatch(&self.sort_scatter, &buffers, arguments, n_sorted);
         }
         let last = (N_PASSES % 2) as usize;
         let buffers = [self.order[last].all(), records.clone(), sorted.all()];

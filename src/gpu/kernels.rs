@@ -147,6 +147,11 @@ impl<'a> Modules<'a> {
         Self { context, shared }
     }
 
+    /// Where they are made.
+    pub(super) fn context(&self) -> &'a Context {
+        self.context
+    }
+
     /// The entry point `name` of `module`; `bindings` are those of its group 0, storage buffers by their [`Access`].
     pub(super) fn kernel(
         &self,
