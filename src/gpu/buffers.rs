@@ -1,6 +1,7 @@
 //! Buffers that grow, and reading them back.
 
 use std::sync::mpsc;
+use std::time::Duration;
 
 use bytemuck::Pod;
 
@@ -87,6 +88,8 @@ impl Array {
     }
 }
 
+/// How long a callback may be late.
+const CALLBACK: Duration = Duration::from_secs(60);
 /// Bytes moved between host and device at once.
 const PIECE: usize = 32 << 20;
 
@@ -134,7 +137,8 @@ impl Readback {
             let (sender, receiver) = mpsc::channel();
             slice.map_async(wgpu::MapMode::Read, move |result| drop(sender.send(result)));
             context.wait()?;
-            match receiver.try_recv() {
+            // Another thread that polls the device may be the one that calls back, a moment after this one is through.
+            match receiver.recv_timeout(CALLBACK) {
                 Ok(Ok(())) => {}
                 _ => return Err(context.error("memory could not be read back".to_owned())),
             }
