@@ -120,6 +120,11 @@ impl Readback {
         first_byte: u64,
         n: usize,
     ) -> Result<Vec<T>, Error> {
+        let end = (n as u64).checked_mul(size_of::<T>() as u64).and_then(|bytes| bytes.checked_add(first_byte));
+        if end.is_none_or(|end| end > from.size()) {
+            let what = format!("{n} elements from byte {first_byte} on are asked of a buffer of {} bytes", from.size());
+            return Err(context.error(what));
+        }
         let mut elements = vec![T::zeroed(); n];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut elements);
         let piece = bytes.len().min(PIECE).next_multiple_of(16) as u64;

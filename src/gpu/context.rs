@@ -317,7 +317,8 @@ impl Context {
 
     /// Most bytes of one array that a shader can see.
     pub fn most_bytes_bound(&self) -> u64 {
-        self.limits.max_storage_buffer_binding_size
+        // Buffers are multiples of 16 bytes.
+        self.limits.max_storage_buffer_binding_size.min(self.limits.max_buffer_size) & !15
     }
 
     /// Waits for the device and copies `n` elements of a buffer with usage `COPY_SRC` to the host, from a byte on that is a
@@ -375,7 +376,7 @@ impl Context {
 
     /// Refuses more bytes than one binding holds.
     pub(super) fn check_bound(&self, what: &str, bytes: u64) -> Result<(), Error> {
-        let allowed = self.limits.max_storage_buffer_binding_size;
+        let allowed = self.most_bytes_bound();
         if bytes > allowed { Err(self.too_large(what, bytes, allowed)) } else { Ok(()) }
     }
 

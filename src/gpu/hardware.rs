@@ -51,6 +51,12 @@ impl Hardware {
         })
     }
 
+    /// Most points that a device takes.
+    pub(super) fn max_points(context: &Context) -> u32 {
+        let bound = (context.most_bytes_bound() / STRIDE).min(u64::from(u32::MAX - 1)) as u32;
+        context.limits.max_blas_primitive_count.min(bound)
+    }
+
     /// Makes room for `n` points.
     pub(super) fn reserve(&mut self, context: &Context, n: u32) -> Result<(), Error> {
         let n = n.max(1);
@@ -59,7 +65,7 @@ impl Hardware {
         }
         self.trees = None;
         // A little more than asked, for the number changes from one build to the next.
-        let most = context.limits.max_blas_primitive_count;
+        let most = Self::max_points(context);
         let roomy = n.saturating_add(n / 16).min(most).max(n);
         if n > most {
             return Err(Error::TooLarge {

@@ -102,10 +102,12 @@ impl Index {
     /// Makes room for the tree over `n` points.
     pub(super) fn reserve(&mut self, context: &Context, n: u32) -> Result<(), Error> {
         self.reserve_sort(context, n)?;
-        let n_boxes = |n: u64| levels(n as u32).last().map_or(1, |[first, n]| u64::from(first + n));
-        let (boxes, roomy) = (n_boxes(u64::from(n)), n_boxes(roomy(n)));
-        room(context, &mut self.boxes, boxes, roomy)?;
-        room(context, &mut self.nodes, boxes / 8 + 2, roomy / 8 + 2)
+        let (levels_now, roomy_levels) = (levels(n), levels(roomy(n).min(u64::from(u32::MAX)) as u32));
+        let n_boxes = |levels: &[[u32; 2]]| levels.iter().map(|l| u64::from(l[1])).sum::<u64>().max(1);
+        // Every box but a leaf's is a node.
+        let n_nodes = |levels: &[[u32; 2]]| n_boxes(levels.get(1..).unwrap_or_default());
+        room(context, &mut self.boxes, n_boxes(&levels_now), n_boxes(&roomy_levels))?;
+        room(context, &mut self.nodes, n_nodes(&levels_now), n_nodes(&roomy_levels))
     }
 
     /// Makes room for a sort of `n` points.

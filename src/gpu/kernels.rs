@@ -189,6 +189,8 @@ impl<'a> Modules<'a> {
     ) -> Result<Kernel, wgpu::Error> {
         let device = &self.context.device;
         let n_groups = (1..4).rev().find(|n| source.contains(&format!("@group({n})"))).unwrap_or(0);
+        // A text of the user's own may name a group that there is none of: the pipeline is then refused.
+        let n_groups = n_groups.min(self.shared.groups.len());
         let build = || {
             let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(module),

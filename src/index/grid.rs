@@ -33,7 +33,7 @@ const FEW: usize = 4096;
 /// Queries that are sorted together, by one thread: at most.
 const MANY: usize = 1 << 18;
 
-/// Whether a batch is sorted, by bricks of cells, before it is answered.
+/// Whether `fold_all` and `count_all` sort a batch, by bricks of cells, before they answer it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum QueryOrder {
     /// Sorted where neighbours in the slice are not neighbours in space.

@@ -12,8 +12,10 @@ use super::batch::GRAIN;
 use super::stats::{CountVisits, Hierarchy, Node, Visits};
 use super::{Error, KdTree, Nearest, Neighbour, Radii, RadiusSearch};
 
-/// Queries answered before their buffers are read and filled anew, in [`KdBuffered`]'s `fold_all`.
+/// Queries answered before their buffers are read and filled anew, in [`KdBuffered`]'s `fold_all`, at most.
 const BATCH: usize = 1 << 16;
+/// Results that these buffers hold, at most, if a row is not longer.
+const MAX_RESULTS: usize = 1 << 23;
 
 /// Results of radius queries, a row each.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -138,8 +140,9 @@ impl RadiusSearch for KdBuffered {
         radii.check(queries, self.max_radius())?;
         let mut folded = Vec::with_capacity(queries.len());
         let mut buffers = Buffers::default();
-        for (batch, queries) in queries.chunks(BATCH).enumerate() {
-            let first = batch * BATCH;
+        let size = (MAX_RESULTS / self.capacity.max(1)).clamp(1, BATCH);
+        for (batch, queries) in queries.chunks(size).enumerate() {
+            let first = batch * size;
             self.fill_from(queries, first, radii, &mut buffers);
             buffers.check()?;
             let fold = |q: usize| {

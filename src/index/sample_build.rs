@@ -48,7 +48,7 @@ impl Topology {
         let all = self.boxes.par_iter().with_min_len(8192).copied().reduce(|| NOTHING, join);
         // To fit a box of at most 1 an axis, so that neither areas nor extents overflow.
         let largest = all.0.abs().max(all.1.abs()).max_element();
-        let scale = if largest > 0.0 { 0.5 / largest } else { 1.0 };
+        let scale = if largest > 0.0 { (0.5 / largest).min(f32::MAX) } else { 1.0 };
         self.boxes.par_iter_mut().with_min_len(8192).for_each(|b| *b = (b.0 * scale, b.1 * scale));
         let centre = |b: &Aabb| (b.0 + b.1) * 0.5;
         let fold = |all, b: &Aabb| join(all, (centre(b), centre(b)));
@@ -131,9 +131,11 @@ impl Topology {
         while self.clusters.len() > 1 {
             let clusters = &self.clusters;
             let nearest = |i: usize| {
-                let (from, to) = (i.saturating_sub(reach), (i + reach + 1).min(clusters.len()));
+                let (from, to) =
+                    (i.saturating_sub(reach), i.saturating_add(reach).saturating_add(1).min(clusters.len()));
                 let aabb = clusters[i].aabb;
-                let (mut best, mut least) = (i, f32::INFINITY);
+                // Never itself: each round must merge something.
+                let (mut best, mut least) = (if i == 0 { 1 } else { i - 1 }, f32::INFINITY);
                 for j in (from..i).chain(i + 1..to) {
                     let area = half_area(join(aabb, clusters[j].aabb));
                     if area < least || (area == least && is_before((i, j), (i, best))) {

@@ -236,7 +236,7 @@ fn nearest_one<L: Lanes>(
     pending[top] = reach.enter(on, tree, top, 0, bound);
     loop {
         let (octet, bits, d2) = &mut pending[level];
-        let (least, child) = on.least(*bits, on.load(d2));
+        let (least, child) = if *bits == 0 { (f32::INFINITY, 0) } else { on.least(*bits, on.load(d2)) };
         if least > bound {
             if level == top {
                 return;

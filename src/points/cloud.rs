@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::Error;
-use crate::index::{NearestLists, PointBvh, Radii, RadiusSearch};
+use crate::index::{MAX_K, NearestLists, PointBvh, Radii, RadiusSearch};
 
 /// Size of a coordinate, at most: its square and sums of squares stay finite.
 pub const MAX_COORDINATE: f64 = 1e100;
@@ -62,7 +62,8 @@ pub(super) fn bounds(positions: &[DVec3]) -> Option<(DVec3, DVec3)> {
 
 /// Coordinates for the search: the cloud's centre at the origin, its longest side between 1/2 and 1.
 ///
-/// The scale is a power of two, so only the origin costs rounding: 2⁻²⁵ of the longest side. With it a cloud gives the
+/// The scale is a power of two, so only the origin costs rounding: 2⁻²⁵ of the longest side, which one stray point far
+/// off makes long: remove such points first. With it a cloud gives the
 /// same answers in millimetres and in kilometres, and squared distances neither overflow nor vanish.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
@@ -79,10 +80,11 @@ impl Frame {
         Self { origin: 0.5 * (min + max), scale }
     }
 
-    /// A position in the frame.
+    /// A position in the frame; what lies further off than squares reach is moved nearer, and is still far from all.
     #[inline]
     pub fn local(&self, position: DVec3) -> Vec3 {
-        ((position - self.origin) * self.scale).as_vec3()
+        let far = DVec3::splat(1e18);
+        ((position - self.origin) * self.scale).clamp(-far, far).as_vec3()
     }
 
     /// A distance in the frame.
@@ -140,12 +142,17 @@ impl<'a> Indexed<'a> {
     pub fn spacing(&self) -> Option<f64> {
         let step = self.positions.len().div_ceil(SPACING_SAMPLES).max(1);
         let asked: Vec<DVec3> = self.positions.iter().copied().step_by(step).collect();
-        let lists = self.nearest(&asked, f64::INFINITY, SPACING_K).ok()?;
+        // More where each position occurs many times.
+        self.spacing_among(&asked, SPACING_K).or_else(|| self.spacing_among(&asked, MAX_K))
+    }
+
+    fn spacing_among(&self, asked: &[DVec3], k: usize) -> Option<f64> {
+        let lists = self.nearest(asked, f64::INFINITY, k).ok()?;
         let elsewhere = |(row, &p): (&[u32], &DVec3)| {
             let near = row.iter().filter_map(|&i| self.positions.get(i as usize));
             near.map(|q| q.distance(p)).filter(|&d| d > 0.0).min_by(f64::total_cmp)
         };
-        median(lists.indices.chunks(SPACING_K).zip(&asked).filter_map(elsewhere).collect())
+        median(lists.indices.chunks(k).zip(asked).filter_map(elsewhere).collect())
     }
 }
 

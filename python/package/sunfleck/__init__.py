@@ -27,7 +27,9 @@ class Index:
 
     def __init__(self, points: ArrayLike, radius: float | None = None) -> None:
         self._tree = Tree(_rows(points))
-        self.radius = None if radius is None else float(_radii(radius)[0][0])
+        self.radius = None if radius is None else float(radius)
+        if self.radius is not None and not self.radius >= 0:
+            raise ValueError(f"radius is {radius}: it is zero or more")
 
     def __len__(self) -> int:
         return len(self._tree)

@@ -186,6 +186,8 @@ fn make(args: &MakeArgs) -> Result<()> {
     let motion = Rigid { rotation: turn, translation: DVec3::from_array(args.shift.0) };
     if motion != Rigid::IDENTITY {
         cloud.positions = motion.apply_all(&cloud.positions);
+        // What was moved far off would be rounded there.
+        cloud.precision = Precision::Double;
     }
     crate::print(&format!("points     {}", cloud.len()));
     args.common.write(&cloud, None)

@@ -14,10 +14,12 @@ use crate::index::{self, MAX_K, NearestLists, Neighbours, Radii};
 const THREADS: u32 = 64;
 /// Counts a workgroup of `scan.wgsl` handles: `BLOCK` there.
 const SCAN_BLOCK: u32 = 2048;
-/// Queries of the first dispatch, before anything is known about how long they take.
-const FIRST_CHUNK: u32 = 32768;
+/// Queries of the first dispatch at most, before anything is known about how long they take.
+const FIRST_CHUNK: u64 = 32768;
+/// Points the first dispatch tests at most, if all of them are within the radius.
+const FIRST_TESTS: u64 = 1 << 34;
 /// Queries of the smallest dispatch.
-const LEAST_CHUNK: u32 = 1024;
+const LEAST_CHUNK: u64 = 64;
 /// How much larger one dispatch may be than the one before.
 const GROWTH: f64 = 16.0;
 /// Seconds a dispatch may take, well below what watchdogs allow.
@@ -213,7 +215,8 @@ impl PointSearch {
         Ok(DeviceNeighbours { offsets, indices, distances2 })
     }
 
-    /// Runs a kernel that imports `search` for all queries, in dispatches short enough for any watchdog.
+    /// Runs a kernel that imports `search` for all queries, in dispatches that aim at a tenth of a second, well below what watchdogs allow. One
+    /// query is never split: a radius that holds tens of millions of points may take longer.
     pub(super) fn launch(
         &mut self,
         stage: usize,
@@ -233,7 +236,8 @@ impl PointSearch {
         let levels = self.index.levels.len() as u32;
         let mut batch = Batch::new(&self.context, &self.shared, "search");
         self.timer.begin(stage, &mut batch);
-        let (mut first, mut chunk) = (0, FIRST_CHUNK);
+        let most = FIRST_TESTS / u64::from(self.n_points.max(1));
+        let (mut first, mut chunk) = (0, most.clamp(LEAST_CHUNK, FIRST_CHUNK) as u32);
         while first < n {
             let end = n.min(first.saturating_add(chunk));
             let mut arguments = self.index.arguments([first, end, set.records.words, u32::from(set.each)]);
@@ -244,7 +248,7 @@ impl PointSearch {
                 batch.submit()?;
                 self.context.wait()?;
                 let factor = (DISPATCH_SECONDS / begun.elapsed().as_secs_f64()).min(GROWTH);
-                chunk = (f64::from(chunk) * factor).clamp(f64::from(LEAST_CHUNK), f64::from(1u32 << 30)) as u32;
+                chunk = (f64::from(chunk) * factor).clamp(LEAST_CHUNK as f64, f64::from(1u32 << 30)) as u32;
                 batch = Batch::new(&self.context, &self.shared, "search");
             }
             first = end;

@@ -170,7 +170,8 @@ impl PointSearch {
     /// Most points that fit one binding of this device; its memory may allow fewer.
     pub fn max_points(&self) -> u32 {
         let bytes = self.context.most_bytes_bound() / u64::from(4 * WORDS);
-        bytes.min(u64::from(u32::MAX - 1)) as u32
+        let most = bytes.min(u64::from(u32::MAX - 1)) as u32;
+        if self.hardware.is_some() { most.min(Hardware::max_points(&self.context)) } else { most }
     }
 
     fn clear(&mut self) {
@@ -183,6 +184,11 @@ impl PointSearch {
         let result = self.reserve(n);
         if result.is_err() {
             self.reserve(0)?;
+            if let Some(hardware) = &mut self.hardware {
+                let mut batch = Batch::new(&self.context, &self.shared, "nothing");
+                hardware.build(&mut batch, 0, &self.points, WORDS, self.max_radius[1]);
+                batch.submit()?;
+            }
         }
         result
     }

@@ -82,7 +82,7 @@ impl Records {
             let problem = format!("has records of {words} words: a position takes 3");
             return Err(Error::Buffer { what, problem });
         }
-        check_buffer(context, what, buffer, 4 * u64::from(words) * u64::from(n))?;
+        check_buffer(context, what, buffer, (4 * u64::from(words)).saturating_mul(u64::from(n)))?;
         Ok(Self { buffer: buffer.clone(), n, words })
     }
 

@@ -19,7 +19,8 @@ impl PointSearch {
     ///
     /// ```wgsl
     /// struct Visitor {
-    ///     radius2: f32,   // points beyond it are passed over: `begin` sets it, `visit` may shrink it
+    ///     radius2: f32,   // points beyond it are passed over: `begin` sets it, `visit` may shrink it;
+    ///                     // with ray queries at most the square of the largest radius
     ///     // … and whatever is to be known of the query
     /// }
     /// // Before the first neighbour; `query` is the caller's index, `radius2` the square of its radius.

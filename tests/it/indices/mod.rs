@@ -373,3 +373,12 @@ fn threads_do_not_change_the_answers() {
     };
     assert!(at(1) == at(3));
 }
+
+/// Whose inverse extent is no number; and a reach beyond all clusters.
+#[test]
+fn trees_over_next_to_nothing_are_built() {
+    let points = [Vec3::ZERO, Vec3::new(1e-40, 0.0, 0.0), Vec3::splat(2e-40), Vec3::new(0.0, -1e-42, 0.0)];
+    for builder in [Builder::Lbvh, PLOC, Builder::Ploc { reach: usize::MAX }] {
+        assert_eq!(sample_bvh(&points, builder, Boxes::Tight, 1).count(Vec3::ZERO, 1.0), 4, "{builder:?}");
+    }
+}
