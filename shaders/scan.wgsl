@@ -21,6 +21,14 @@ fn run_of(block: u32, local: u32) -> vec2<u32> {
     return min(vec2(begin, begin + PER_THREAD), vec2(arguments.values.x));
 }
 
+fn sum_of(run: vec2<u32>) -> u32 {
+    var sum = 0u;
+    for (var i = run.x; i < run.y; i++) {
+        sum = add(sum, counts[i]);
+    }
+    return sum;
+}
+
 var<workgroup> partial: array<u32, THREADS>;
 
 // Sum of the values of the threads up to this one.
@@ -55,12 +63,7 @@ fn scan_blocks(
     @builtin(local_invocation_index) local: u32,
 ) {
     let block = workgroup.y * workgroups.x + workgroup.x;
-    let run = run_of(block, local);
-    var sum = 0u;
-    for (var i = run.x; i < run.y; i++) {
-        sum = add(sum, counts[i]);
-    }
-    let total = inclusive(local, sum);
+    let total = inclusive(local, sum_of(run_of(block, local)));
     if local == THREADS - 1u && block < arguments.values.y {
         sums[block] = total;
     }
@@ -94,11 +97,7 @@ fn scan_offsets(
 ) {
     let block = workgroup.y * workgroups.x + workgroup.x;
     let run = run_of(block, local);
-    var sum = 0u;
-    for (var i = run.x; i < run.y; i++) {
-        sum = add(sum, counts[i]);
-    }
-    let before = exclusive(local, sum);
+    let before = exclusive(local, sum_of(run));
     if block >= arguments.values.y {
         return;
     }

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::lanes::{Eight, WIDTH};
 use super::{Error, FANOUT, LEAF_SIZE, Nearest, NearestLists, Radii, RadiusSearch, check_points, packet, radix, walk};
-use crate::math::morton;
+use crate::math::morton::Grid;
 
 const _: () = assert!(LEAF_SIZE == FANOUT && FANOUT as usize == WIDTH);
 /// Bits of a Morton key that are sorted by only where the others agree.
@@ -43,8 +43,8 @@ pub struct PointBvh {
     pub(super) boxes: Vec<Octet>,
     /// First octet of each level.
     pub(super) levels: Vec<u32>,
-    /// Least corner, and Morton cells a unit of length along each axis.
-    grid: (Vec3, Vec3),
+    /// Of the Morton order.
+    grid: Grid,
     /// Upper half of the Morton key of each leaf's first point.
     firsts: Vec<u32>,
     /// What is sorted, and room for it.
@@ -111,9 +111,9 @@ impl PointBvh {
             .with_min_len(8192)
             .fold(|| nothing, |(min, max), i| (min.min(point(i)), max.max(point(i))))
             .reduce(|| nothing, |a, b| (a.0.min(b.0), a.1.max(b.1)));
-        let scale = (max - min).map(|extent| if extent > 0.0 { morton::CELLS / extent } else { 0.0 });
-        self.grid = (min, scale);
-        let key = |i: usize| morton_key(point(i), min, scale);
+        self.grid = Grid::new(min, max);
+        let grid = self.grid;
+        let key = |i: usize| grid.key(point(i));
         // The upper half of each key before the index; the few that agree in it are sorted by the whole key.
         let word = |i: usize| key(i) >> LOWER << 32 | i as u64;
         (0..n).into_par_iter().with_min_len(8192).map(word).collect_into_vec(&mut self.words);
@@ -132,8 +132,7 @@ impl PointBvh {
     /// Leaves about the place that a point would have in Morton order: one, and more where `k` needs them.
     #[inline]
     pub(super) fn leaves_about(&self, p: Vec3, k: usize) -> Range<u32> {
-        let (min, scale) = self.grid;
-        let key = (morton_key(p, min, scale) >> LOWER) as u32;
+        let key = (self.grid.key(p) >> LOWER) as u32;
         let place = self.firsts.partition_point(|&first| first <= key).saturating_sub(1);
         let more = k / WIDTH;
         place.saturating_sub(more) as u32..(place + more + 1).min(self.leaves.len()) as u32
@@ -141,8 +140,7 @@ impl PointBvh {
 
     /// About how far points are apart if they fill the cube around them.
     pub(super) fn spacing(&self) -> f32 {
-        let extent = self.grid.1.map(|scale| if scale > 0.0 { morton::CELLS / scale } else { 0.0 });
-        extent.max_element() / (self.n as f32).cbrt()
+        self.grid.longest_side() / (self.n as f32).cbrt()
     }
 
     /// Index of the point in each slot: slots are what [`PointBvh::visit`] reports.
@@ -220,13 +218,6 @@ impl RadiusSearch for PointBvh {
     fn nearest_all(&self, queries: &[Vec3], radii: Radii<'_>, k: usize) -> Result<NearestLists, Error> {
         packet::nearest_all(self, queries, radii, k)
     }
-}
-
-/// Of a point in the grid, or of the cell nearest to it.
-#[inline]
-fn morton_key(p: Vec3, min: Vec3, scale: Vec3) -> u64 {
-    let cell = ((p - min) * scale).clamp(Vec3::ZERO, Vec3::splat(morton::CELLS - 1.0)).as_uvec3();
-    morton::interleave(cell.to_array())
 }
 
 fn union(boxes: &[(Vec3, Vec3)]) -> (Vec3, Vec3) {

@@ -7,7 +7,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::blocks::{NOTHING, join};
-use crate::math::morton;
+use crate::math::morton::Grid;
 
 type Aabb = (Vec3, Vec3);
 
@@ -53,11 +53,8 @@ impl Topology {
         let centre = |b: &Aabb| (b.0 + b.1) * 0.5;
         let fold = |all, b: &Aabb| join(all, (centre(b), centre(b)));
         let (min, max) = self.boxes.par_iter().with_min_len(8192).fold(|| NOTHING, fold).reduce(|| NOTHING, join);
-        let cells = (max - min).map(|extent| if extent > 1e-30 { morton::CELLS / extent } else { 0.0 });
-        let key = |(i, b): (usize, &Aabb)| {
-            let cell = ((centre(b) - min) * cells).min(Vec3::splat(morton::CELLS - 1.0)).as_uvec3();
-            (morton::interleave(cell.to_array()), i as u32)
-        };
+        let grid = Grid::new(min, max);
+        let key = |(i, b): (usize, &Aabb)| (grid.key(centre(b)), i as u32);
         self.boxes.par_iter().with_min_len(8192).enumerate().map(key).collect_into_vec(&mut self.keys);
         self.keys.par_sort_unstable();
     }

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use rayon::prelude::*;
 use sunfleck::index::{Error, Nearest, Radii, RadiusSearch};
-use sunfleck::math::morton;
+use sunfleck::math::morton::Grid;
 
 /// Sorts a batch in Morton order, asks the index in that order, and puts the results back.
 pub struct Sorted<I>(pub I);
@@ -58,12 +58,9 @@ impl<I: RadiusSearch> RadiusSearch for Sorted<I> {
 
 fn morton_order(points: &[Vec3]) -> Vec<u32> {
     let (min, max) = points.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(a, b), &p| (a.min(p), b.max(p)));
-    let scale = (max - min).map(|extent| if extent > 0.0 { morton::CELLS / extent } else { 0.0 });
-    let key = |p: Vec3| {
-        let cell = ((p - min) * scale).min(Vec3::splat(morton::CELLS - 1.0)).as_uvec3();
-        morton::interleave(cell.to_array())
-    };
-    let mut keys: Vec<(u64, u32)> = points.par_iter().enumerate().map(|(i, &p)| (key(p), i as u32)).collect();
+    let grid = Grid::new(min, max);
+    let mut keys: Vec<(u64, u32)> =
+        points.par_iter().zip(0..points.len() as u32).map(|(&p, i)| (grid.key(p), i)).collect();
     keys.par_sort_unstable();
     keys.into_iter().map(|(_, i)| i).collect()
 }
