@@ -245,6 +245,51 @@ fn rebuilt_with_other_sizes() {
     }
 }
 
+/// wgpu binds no empty buffer, but a caller who has no queries, or no points, has one.
+#[test]
+fn empty_buffers_of_the_caller() {
+    let Some(mut search) = search() else { return };
+    assert_empty_buffers(&mut search);
+}
+
+/// The same by ray queries.
+#[test]
+fn empty_buffers_of_the_caller_for_ray_queries() {
+    let Some(context) = crate::gpu_hardware::context() else { return };
+    assert_empty_buffers(&mut PointSearch::hardware(context, 1.0).expect("kernels"));
+}
+
+fn assert_empty_buffers(search: &mut PointSearch) {
+    let context = search.context().clone();
+    let empty = upload::<f32>(&context, &[], wgpu::BufferUsages::STORAGE);
+    let none = Queries::Device { buffer: &empty, n: 0, words_per_record: 3 };
+    let points = uniform(32, 100);
+    for n in [100, 0] {
+        if n > 0 {
+            search.build(&points).expect("build");
+        } else {
+            search.build_from(&empty, 0, 3).expect("no points");
+            assert_eq!(search.count_all(&points[..2], Radii::One(1.0)).expect("no points"), [0, 0]);
+        }
+        for sort in [false, true] {
+            search.set_sort_queries(sort);
+            for radii in [QueryRadii::Device(&empty), Radii::One(0.5).into(), Radii::Each(&[]).into()] {
+                assert!(search.count_on_device(none, radii).expect("no queries").is_empty());
+                let rows = search.neighbours_on_device(none, radii).expect("no queries").download().expect("rows");
+                assert_eq!((rows.offsets, rows.indices), (vec![0], vec![]));
+                let lists = search.nearest_on_device(none, radii, 4).expect("no queries").download().expect("lists");
+                assert!(lists.found.is_empty() && lists.indices.is_empty());
+            }
+        }
+    }
+    let visitor = search.compile(KERNEL_SUM, &[Access::Read, Access::Write]).expect("it compiles");
+    search.visit_all(&visitor, none, QueryRadii::Device(&empty), &[&empty, &empty]).expect("nothing to visit");
+    // With a query it is too short all the same.
+    let one = Queries::Device { buffer: &empty, n: 1, words_per_record: 3 };
+    let short = search.count_on_device(one, Radii::One(0.5).into());
+    assert!(matches!(short, Err(Error::Buffer { .. })), "{:?}", short.map(drop));
+}
+
 /// More queries than one dispatch takes, and more than a block of the prefix sum.
 #[test]
 fn many_queries() {
