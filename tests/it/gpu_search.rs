@@ -554,6 +554,34 @@ fn a_device_of_ones_own_with_too_little() {
     }
 }
 
+/// A device of one's own whose limits are `change`d for the worse. It has no handler: what reaches it panics.
+pub fn meagre_device(change: impl FnOnce(&mut wgpu::Limits)) -> Option<Arc<Context>> {
+    context()?;
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let adapter = pollster::block_on(instance.request_adapter(&Default::default())).expect("an adapter");
+    let mut required_limits = required_limits();
+    change(&mut required_limits);
+    let descriptor = wgpu::DeviceDescriptor { required_limits, ..Default::default() };
+    let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).expect("a device");
+    Some(Arc::new(Context::from_device(device, queue).expect("what is checked there is enough")))
+}
+
+/// Not even the small things that every search has can be made.
+#[test]
+fn what_a_device_of_ones_own_refuses_is_an_error() {
+    let no_buffers = |limits: &mut wgpu::Limits| limits.max_buffer_size = 4096;
+    let no_uniforms = |limits: &mut wgpu::Limits| limits.max_uniform_buffer_binding_size = 64;
+    let changes: [&dyn Fn(&mut wgpu::Limits); 2] = [&no_buffers, &no_uniforms];
+    for change in changes {
+        let Some(context) = meagre_device(change) else { return };
+        let made = PointSearch::new(Arc::clone(&context)).map(drop);
+        assert!(matches!(made, Err(Error::Device { .. })), "{made:?}");
+        let data = upload(&context, &[1.0f32; 4], wgpu::BufferUsages::STORAGE);
+        let read = context.download::<f32>(&data, 0, 4);
+        assert!(matches!(read, Err(Error::Device { .. })), "{read:?}");
+    }
+}
+
 /// Steps of a node's child along an axis: low and high.
 fn steps(node: &TreeNode, axis: usize, child: usize) -> [f32; 2] {
     let words = [node.x, node.y, node.z][axis];
