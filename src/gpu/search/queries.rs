@@ -97,12 +97,9 @@ fn part(buffer: &wgpu::Buffer, bytes: u64) -> wgpu::BindingResource<'_> {
     wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size })
 }
 
-/// Refuses a buffer that cannot be bound, or has less than `bytes`. One of which nothing is needed may be empty, for
-/// no kernel runs then.
+/// Refuses a buffer that cannot be bound, or has less than `bytes`. One of which nothing is needed may be empty, which
+/// cannot be bound: no kernel runs then.
 fn check_buffer(context: &Context, what: &'static str, buffer: &wgpu::Buffer, bytes: u64) -> Result<(), Error> {
-    if bytes == 0 {
-        return Ok(());
-    }
     let refused = |problem: String| Err(Error::Buffer { what, problem });
     if !buffer.usage().contains(wgpu::BufferUsages::STORAGE) {
         return refused("has no usage STORAGE".to_owned());
