@@ -73,8 +73,13 @@ pub fn clouds() -> Vec<(&'static str, Vec<Vec3>)> {
         ("tiny", make(&|i| cube(11, i) * -1e-12)),
         ("huge", make(&|i| cube(12, i) * 1e15)),
         ("squares overflow", make(&|i| cube(13, i) * 1e25)),
-        // Steps from −1 by powers of two meet zero, and there are points just below and above it.
-        ("beside a step of a node", make(&|i| cube(14, i) * if i % 2 == 0 { 1.0 } else { 1e-9 })),
+        // A step from −1 meets zero, and a leaf begins less below it than the difference to −1 shows.
+        (
+            "beside a step of a node",
+            (0..64u8)
+                .map(|i| Vec3::X * if i < 32 { f32::from(i) / 40.0 - 1.0 } else { f32::from(i - 32) / 32.0 - 1e-9 })
+                .collect(),
+        ),
     ]
 }
 
