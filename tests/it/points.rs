@@ -109,6 +109,25 @@ fn the_automatic_outlier_distance_suits_the_sampling() {
     assert!(automatic_outlier(&Indexed::new(&twice).unwrap()) > 0.1, "coincident points hide the spacing");
 }
 
+/// Distances of a stray point from a cloud of size 2.
+const STRAY: [f64; 4] = [1e3, 1e6, 1e12, 1e30];
+
+#[test]
+fn a_stray_point_costs_the_others_nothing() {
+    let (target, source) = (uniform(3000, 0), uniform(1000, 1));
+    let expected = correspond(&source, &Indexed::new(&target).unwrap(), 0.1).unwrap();
+    for far in STRAY {
+        // The stray points match too: the search looks farther by its rounding there, which is more than the 0.1.
+        let mut target = target.clone();
+        target.extend([DVec3::new(far, -0.5 * far, 0.0), DVec3::new(0.0, far, far) * 0.9]);
+        let mut source = source.clone();
+        source.extend([target[3000] + DVec3::Z * 0.01, target[3001] - DVec3::X * 0.01]);
+        let found = correspond(&source, &Indexed::new(&target).unwrap(), 0.1).unwrap();
+        assert!(found[..1000] == expected, "{far}");
+        assert_eq!((found[1000].index, found[1001].index), (3000, 3001), "{far}");
+    }
+}
+
 #[test]
 fn degenerate_clouds_are_matched() {
     for (name, cloud) in degenerate() {

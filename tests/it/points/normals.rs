@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use sunfleck::points::generate::{SHAPES, Shape, scan};
 use sunfleck::points::{Error, Indexed, estimate, orient};
 
-use super::{degenerate, random, sphere};
+use super::{STRAY, degenerate, random, sphere};
 
 /// Estimated and oriented, with the number of pieces.
 fn normals(cloud: &[DVec3], k: usize) -> (Vec<Vec3>, usize) {
@@ -79,6 +79,18 @@ fn two_sides_of_a_thin_shell_stay_apart() {
     assert_eq!(agree(0..5000), 1.0, "the outer shell points outward");
     let inside = agree(5000..cloud.len());
     assert!(inside == 0.0 || inside == 1.0, "the inner shell agrees with itself: {inside}");
+}
+
+#[test]
+fn a_stray_point_costs_the_others_nothing() {
+    let cloud = sphere(5000);
+    for far in STRAY {
+        let with: Vec<DVec3> = cloud.iter().copied().chain([DVec3::X * far]).collect();
+        let found = estimate(&Indexed::new(&with).unwrap(), 8).unwrap().normals;
+        let angle = |(n, p): (&Vec3, &DVec3)| n.as_dvec3().dot(*p).abs().min(1.0).acos().to_degrees();
+        let largest = found.iter().zip(&cloud).map(angle).fold(0.0, f64::max);
+        assert!(largest < 3.0, "{far}: {largest}");
+    }
 }
 
 #[test]

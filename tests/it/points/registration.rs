@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3, Vec3};
 use sunfleck::points::generate::{Shape, scan};
 use sunfleck::points::{Error, Indexed, Method, Registration, Rigid, Settings, estimate, register};
 
-use super::{degenerate, motion, random, uniform};
+use super::{STRAY, degenerate, motion, random, uniform};
 
 const METHODS: [Method; 2] = [Method::PointToPoint, Method::PointToPlane];
 
@@ -16,6 +16,10 @@ fn icp(source: &[DVec3], target: &[DVec3], settings: Settings) -> Result<Registr
 
 fn with(method: Method) -> Settings {
     Settings { method, ..Settings::default() }
+}
+
+fn with_tolerance(method: Method, tolerance: f64) -> Settings {
+    Settings { tolerance, ..with(method) }
 }
 
 /// About the middle of the cloud, so that the error of the rotation does not show as one of the translation.
@@ -82,6 +86,21 @@ fn another_scan_of_the_surface_is_met() {
         steps.push(found.iterations.len());
     }
     assert!(2 * steps[1] < steps[0], "point-to-plane takes {}, point-to-point {}", steps[1], steps[0]);
+}
+
+#[test]
+fn stray_points_neither_stop_it_nor_keep_it_going() {
+    let target = scan(Shape::Bumpy, 3000, 0.0, 0).positions;
+    let (source, truth) = displaced(&target, 1.0);
+    for far in STRAY {
+        let with = |cloud: &[DVec3], stray: DVec3| cloud.iter().copied().chain([stray]).collect::<Vec<_>>();
+        for method in METHODS {
+            let (source, target) = (with(&source, DVec3::Y * far), with(&target, DVec3::X * far));
+            let found = icp(&source, &target, with_tolerance(method, 1e-9)).unwrap();
+            let (angle, shift) = difference(&found.motion, &truth);
+            assert!(found.converged && angle < 1e-6 && shift < 1e-6, "{method:?} {far}: {angle} {shift}");
+        }
+    }
 }
 
 #[test]
