@@ -133,6 +133,38 @@ fn text_clouds_are_read() {
     assert_eq!(cloud.colours, Some(vec![[255, 0, 128, 255]]));
 }
 
+/// Comments in Latin-1, and lines that nothing is taken from, however long they are.
+#[test]
+fn what_is_left_out_need_not_be_text() {
+    let points = [DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 5.0, 6.0)];
+    let long = b" 1".repeat(1 << 16);
+    let xyz = [b"# M\xfcller\n1 2 3 // \xe9\n#", &long[..], b"\xff\n4 5 6 #", &long].concat();
+    assert_eq!(read_xyz(&xyz[..]).unwrap().positions, points);
+    let obj = [
+        b"# M\xfcller\r\no caf\xe9\nv 1 2 3 # \xe9\r\nf",
+        &long[..],
+        b"\nmtllib \xfc.mtl\nv 4 5 6 #",
+        &long,
+        b"\nf 1 2",
+        &long,
+    ]
+    .concat();
+    assert_eq!(read_obj(&obj[..]).unwrap().positions, points);
+    let header = b"ply\nformat ascii 1.0\ncomment M\xfcller\nelement vertex 1\nproperty float x\nproperty float y\n\
+        property float z\nend_header\n1 2 3\n";
+    assert_eq!(ply(header).unwrap().positions, points[..1]);
+    // What is wanted must be text, and bounded.
+    for (data, says) in [
+        (&b"v 1 2 3\nv 1 2 \xe9\n"[..], "line 2: not text"),
+        (b"\xff\xfev\0 \x001\0 \x002\0 \x003\0\n\0", "line 1: not text"),
+        (&[b"v", &long[..], b"\n"].concat(), "line 1: longer than 65536 bytes"),
+        (b"v", "line 1: a vertex of 0 numbers"),
+    ] {
+        assert_eq!(read_obj(data).unwrap_err(), says);
+    }
+    assert_eq!(read_xyz(&b"1 2 3\n1 2 3\xe9\n"[..]).unwrap_err(), "line 2: not text");
+}
+
 #[test]
 fn malformed_text_is_refused() {
     for (text, says) in [
