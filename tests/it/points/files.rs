@@ -389,6 +389,8 @@ fn the_program_refuses_in_one_line() {
         ("register line.xyz line.xyz -o o.ply --method surface", 2, "invalid value 'surface'"),
         ("make cube -o o.ply", 2, "invalid value 'cube'"),
         ("make -o o.ply --points 200M", 2, "at most 100M"),
+        ("make -o o.ply --noise 1e39", 2, "for '--noise <LENGTH>': must be 0 to 1e6"),
+        ("make -o o.ply --noise -1", 2, "for '--noise <LENGTH>': must be 0 to 1e6"),
         ("", 2, "subcommand"),
     ] {
         let output = sunfleck(at, &format!("points {line}"));
