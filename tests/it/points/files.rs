@@ -59,6 +59,17 @@ fn matches_are_written_as_properties() {
     assert_eq!((&rows[36..40], &rows[40..48]), (&(-1_i32).to_le_bytes()[..], &(-1.0_f64).to_le_bytes()[..]));
 }
 
+#[test]
+fn properties_are_written_in_the_stated_order() {
+    let mut bytes = Vec::new();
+    write_ply(&mut bytes, &full(2, Precision::Double), Some(&[Match::NONE; 2])).unwrap();
+    let header = String::from_utf8_lossy(&bytes);
+    let lines = header.lines().take_while(|l| *l != "end_header");
+    let names: Vec<&str> = lines.filter_map(|l| l.strip_prefix("property ")?.split(' ').nth(1)).collect();
+    let expected = "x y z nx ny nz red green blue alpha match distance";
+    assert_eq!(names.join(" "), expected);
+}
+
 /// The same two vertices in all encodings: an element and a list before them, types of all sizes.
 #[test]
 fn all_encodings_of_ply_are_read() {
@@ -176,6 +187,7 @@ fn malformed_text_is_refused() {
         ("1 -inf 3\n", "line 1: y is -inf"),
         ("1e200 2 3\n", "line 1: x is 1"),
         ("1 2 3 0.5 7 900\n", "neither unit normals nor colours"),
+        ("1 2 3 0 0 0.9\n", "neither unit normals nor colours"),
     ] {
         let error = read_xyz(text.as_bytes()).unwrap_err();
         assert!(error.contains(says), "{text:?}: {error}");

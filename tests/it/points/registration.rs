@@ -146,13 +146,47 @@ fn a_fixed_outlier_distance_is_kept() {
     let far: Vec<DVec3> = target.iter().map(|p| *p + DVec3::X * 10.0).collect();
     let error = icp(&far, &target, settings).unwrap_err();
     assert_eq!(error, Error::Apart { iteration: 0, matches: 0, distance: 0.05 });
+    let two = [&target[..2], &far[2..]].concat();
+    let error = icp(&two, &target, settings).unwrap_err();
+    assert_eq!(error, Error::Apart { iteration: 0, matches: 2, distance: 0.05 });
+    // To a plane only where there is a normal.
+    let normals: Vec<Vec3> = (0..2000).map(|i| if i % 2 == 0 { Vec3::ZERO } else { Vec3::Z }).collect();
+    let plane = Settings { method: Method::PointToPlane, ..settings };
+    let found = register(&target, &Indexed::new(&target).unwrap(), Some(&normals), &plane, |_, _| {}).unwrap();
+    assert_eq!(found.iterations[0].inliers, 0.5);
     let none = icp(&source, &target, Settings { iterations: 0, ..settings }).unwrap();
     assert!(none.motion == Rigid::IDENTITY && none.iterations.len() == 1 && !none.converged);
 }
 
 #[test]
+fn two_iterations_are_one_after_the_other() {
+    let target = scan(Shape::Bumpy, 2000, 0.0, 0).positions;
+    let (source, _) = displaced(&target, 1.0);
+    for method in METHODS {
+        let after = |source: &[DVec3], iterations| {
+            let settings = Settings { iterations, outlier: Some(1.0), ..with(method) };
+            icp(source, &target, settings).unwrap().motion
+        };
+        let first = after(&source, 1);
+        let second = after(&first.apply_all(&source), 1);
+        let (angle, shift) = difference(&after(&source, 2), &second.after(&first));
+        assert!(angle < 1e-9 && shift < 1e-9, "{method:?}: {angle} {shift}");
+        let p = DVec3::new(0.3, 0.5, -0.9);
+        assert!(second.after(&first).apply(p).distance(second.apply(first.apply(p))) < 1e-12);
+    }
+}
+
+#[test]
 fn a_reflection_is_never_taken() {
-    // The best orthogonal map of these is a mirror.
+    // Flat, so that each point is matched to its own mirror image: the best orthogonal map is the mirror.
+    let flat: Vec<DVec3> =
+        (0..49).map(|i| DVec3::new((i % 7) as f64, (i / 7) as f64, 0.1 * random(i, 8)[0] - 0.05)).collect();
+    let mirrored: Vec<DVec3> = flat.iter().map(|p| DVec3::new(p.x, p.y, -p.z)).collect();
+    let found = icp(&mirrored, &flat, with(Method::PointToPoint)).unwrap();
+    assert!(found.converged && found.motion.angle() < 0.05, "{}", found.motion.angle());
+    let last = found.iterations.last().unwrap();
+    assert!(last.inliers == 1.0 && last.rms > 0.01, "{last:?}");
+    // And where it locks in anywhere.
     let target = uniform(50, 2);
     let mirrored: Vec<DVec3> = target.iter().map(|p| DVec3::new(p.x, p.y, -p.z)).collect();
     let found = icp(&mirrored, &target, Settings { outlier: Some(1e9), ..Settings::default() }).unwrap();
