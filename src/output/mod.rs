@@ -1,7 +1,9 @@
-//! Pictures on disk: OpenEXR with everything needed to make them again, PNG to look at, and how two pictures differ.
+//! Pictures on disk: OpenEXR with everything needed to make them again, PNG to look at; pictures on a screen; and how
+//! two pictures differ.
 
 pub mod atomic;
 pub mod compare;
+pub mod display;
 pub mod exr;
 pub mod png;
 pub mod tonemap;
