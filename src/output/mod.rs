@@ -3,6 +3,7 @@
 
 pub mod atomic;
 pub mod compare;
+pub mod difference;
 pub mod display;
 pub mod exr;
 pub mod png;
