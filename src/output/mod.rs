@@ -6,6 +6,7 @@ pub mod compare;
 pub mod difference;
 pub mod display;
 pub mod exr;
+pub mod false_colour;
 pub mod png;
 pub mod tonemap;
 
