@@ -7,6 +7,7 @@ pub mod difference;
 pub mod display;
 pub mod exr;
 pub mod false_colour;
+pub mod flip;
 pub mod png;
 pub mod tonemap;
 
