@@ -8,6 +8,7 @@ pub mod display;
 pub mod exr;
 pub mod false_colour;
 pub mod flip;
+pub mod histogram;
 pub mod png;
 pub mod tonemap;
 
