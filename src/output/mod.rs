@@ -3,6 +3,7 @@
 
 pub mod atomic;
 pub mod compare;
+pub mod convergence;
 pub mod difference;
 pub mod display;
 pub mod exr;
