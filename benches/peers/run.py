@@ -16,12 +16,15 @@ HERE = pathlib.Path(__file__).resolve().parent
 OUT = HERE.parents[1] / "target" / "peers"
 
 # Library: what runs it, and where its version is said if it does not say it itself.
-RUST = ["sunfleck", "sunfleck-single", "sunfleck-grid", "kiddo", "obvhs-ploc", "obvhs-medium", "rstar"]
+RUST = ["sunfleck", "sunfleck-single", "sunfleck-median", "sunfleck-median-single", "sunfleck-grid"]
+RUST += ["kiddo", "obvhs-ploc", "obvhs-medium", "rstar"]
 CPP = ["embree", "flann", "nanoflann"]
 LIBRARIES = RUST + CPP + ["scipy"]
 TITLES = {
     "sunfleck": "Sunfleck, `PointBvh`, batch",
     "sunfleck-single": "Sunfleck, `PointBvh`, query by query",
+    "sunfleck-median": "Sunfleck, `PointBvh`, median order, batch",
+    "sunfleck-median-single": "Sunfleck, `PointBvh`, median order, query by query",
     "sunfleck-grid": "Sunfleck, `HashGrid`, sorted queries",
     "kiddo": "kiddo, `ImmutableKdTree`",
     "obvhs-ploc": "obvhs, PLOC, boxes grown by r",

@@ -1,7 +1,7 @@
 //! The native half of the Python package: contiguous `f32` arrays in, arrays out. Shapes, defaults and conversions are the
 //! business of `package/sunfleck/__init__.py`.
 
-use ::sunfleck::index::{self, MAX_K, PointBvh, Radii, RadiusSearch};
+use ::sunfleck::index::{self, MAX_K, PointBvh, PointOrder, Radii, RadiusSearch};
 use glam::Vec3;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -19,7 +19,7 @@ impl Tree {
     #[new]
     fn new(py: Python<'_>, points: PyReadonlyArray2<'_, f32>) -> PyResult<Self> {
         let points = rows(&points)?;
-        py.detach(|| PointBvh::new(points)).map(Self).map_err(refused)
+        py.detach(|| PointBvh::with_order(points, PointOrder::Median)).map(Self).map_err(refused)
     }
 
     fn __len__(&self) -> usize {

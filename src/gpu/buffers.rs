@@ -80,11 +80,13 @@ impl Array {
         debug_assert_eq!(size_of::<T>() as u64, self.stride, "{}", self.what);
         self.reserve(context, data.len() as u64)?;
         // In pieces, for the queue keeps a copy of each until it is done.
-        for (i, piece) in bytemuck::cast_slice::<T, u8>(data).chunks(PIECE).enumerate() {
-            context.queue.write_buffer(self.raw(), (i * PIECE) as u64, piece);
-            context.queue.submit([]);
-        }
-        context.check()
+        context.guarded(|| {
+            for (i, piece) in bytemuck::cast_slice::<T, u8>(data).chunks(PIECE).enumerate() {
+                context.queue.write_buffer(self.raw(), (i * PIECE) as u64, piece);
+                context.queue.submit([]);
+            }
+            context.check()
+        })
     }
 }
 
@@ -134,7 +136,7 @@ impl Readback {
             self.buffer = Some(context.buffer("readback", piece, 0, usage)?);
         }
         let buffer = &self.buffer.as_ref().expect("made above").raw;
-        for (i, part) in bytes.chunks_mut(PIECE).enumerate() {
+        let read_part = |(i, part): (usize, &mut [u8])| {
             let mut batch = Batch::new(context, shared, "readback");
             batch.encoder().copy_buffer_to_buffer(from, first_byte + (i * PIECE) as u64, buffer, 0, part.len() as u64);
             batch.submit()?;
@@ -151,8 +153,9 @@ impl Readback {
             part.copy_from_slice(&view);
             drop(view);
             buffer.unmap();
-        }
-        context.check()?;
+            context.check()
+        };
+        context.guarded(|| bytes.chunks_mut(PIECE).enumerate().try_for_each(read_part))?;
         Ok(elements)
     }
 }

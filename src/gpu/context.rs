@@ -332,7 +332,7 @@ impl Context {
         if n == 0 {
             return Ok(Vec::new());
         }
-        Readback::default().read_from(self, &Shared::new(self, Vec::new()), buffer, first_byte, n)
+        self.guarded(|| Readback::default().read_from(self, &Shared::new(self, Vec::new()), buffer, first_byte, n))
     }
 
     /// Bytes that may still be given to buffers.
@@ -385,6 +385,12 @@ impl Context {
         let scopes = Scopes::new(&self.device);
         let result = work();
         scopes.first().map_or(Ok(result), Err)
+    }
+
+    /// The same for work that can fail in other ways too. What makes or writes anything on the device lies in one of these
+    /// or in a [`super::kernels::Batch`]: a device without a handler of its own panics at what goes wrong elsewhere.
+    pub(super) fn guarded<T>(&self, work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
+        self.scoped(work).map_err(|error| self.error(error.to_string()))?
     }
 
     /// Waits until the device has done all it was given.

@@ -254,6 +254,12 @@ impl<'a> Batch<'a> {
         &mut self.encoder
     }
 
+    /// Writes the beginning of a buffer, before anything in this batch runs.
+    #[cfg(feature = "render")]
+    pub(super) fn write(&self, buffer: &wgpu::Buffer, bytes: &[u8]) {
+        self.context.queue.write_buffer(buffer, 0, bytes);
+    }
+
     /// Records `groups` workgroups.
     pub(super) fn dispatch(
         &mut self,

@@ -1,7 +1,7 @@
-//! An implicit 8-ary tree of tight boxes over points in Morton order.
+//! An implicit 8-ary tree of tight boxes over points in Morton order, or in that of a kd-tree.
 //!
 //! Box k of level 0 holds the sorted points 8k … 8k+7; box k of level l+1 holds the boxes 8k … 8k+7 of level l, up to a
-//! level of one box. There are no pointers, the build is a sort and one pass a level, and the GPU builds the same tree.
+//! level of one box. There are no pointers, the build is a sort and one pass a level, and the GPU builds the same tree in Morton order.
 //! Boxes are not grown by the radius: a query tests its ball against them, so one tree serves every radius, and k-NN can
 //! shrink its ball as it goes.
 
@@ -11,6 +11,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::lanes::{Eight, WIDTH};
+use super::median::{self, Numbered};
 use super::{Error, FANOUT, LEAF_SIZE, Nearest, NearestLists, Radii, RadiusSearch, check_points, packet, radix, walk};
 use crate::math::morton::Grid;
 
@@ -31,9 +32,21 @@ pub(super) struct Octet {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Points(pub(super) [Eight; 3]);
 
+/// The order that points are put into, and with it which of them share a box.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PointOrder {
+    /// Along the Morton curve: a radix sort, for points that are soon others. Boxes overlap where the curve jumps.
+    #[default]
+    Morton,
+    /// Halved at the median of the widest axis, and so on: boxes overlap in faces at most. It takes some three times as
+    /// long to build, and searches of uniform points half to two thirds as long: for points that are asked much.
+    Median,
+}
+
 /// See the module.
 #[derive(Clone, Debug, Default)]
 pub struct PointBvh {
+    point_order: PointOrder,
     /// Number of points.
     n: usize,
     /// Index of the point in each slot, padded to whole leaves.
@@ -43,22 +56,28 @@ pub struct PointBvh {
     pub(super) boxes: Vec<Octet>,
     /// First octet of each level.
     pub(super) levels: Vec<u32>,
-    /// Of the Morton order.
+    /// Over all points, of the Morton order.
     grid: Grid,
-    /// Upper half of the Morton key of each leaf's first point.
+    /// Upper half of the Morton key of each leaf's first point; none in another order.
     firsts: Vec<u32>,
     /// What is sorted, and room for it.
     words: Vec<u64>,
     other: Vec<u64>,
+    numbered: Vec<Numbered>,
     /// Boxes of the level that is built.
     bounds: Vec<(Vec3, Vec3)>,
 }
 
 impl PointBvh {
-    /// Over all of `points`.
+    /// Over all of `points`, in Morton order.
     pub fn new(points: &[Vec3]) -> Result<Self, Error> {
+        Self::with_order(points, PointOrder::Morton)
+    }
+
+    /// Over all of `points`; [`PointBvh::rebuild`] keeps to that order.
+    pub fn with_order(points: &[Vec3], point_order: PointOrder) -> Result<Self, Error> {
         check_points(points)?;
-        let mut tree = Self::default();
+        let mut tree = Self { point_order, ..Self::default() };
         tree.rebuild(points.len(), |i| points[i]);
         Ok(tree)
     }
@@ -103,7 +122,7 @@ impl PointBvh {
         }
     }
 
-    /// Slots in Morton order; ties in order of the index.
+    /// Fills in the slots; ties in order of the index.
     fn sort(&mut self, n: usize, point: &(impl Fn(usize) -> Vec3 + Sync)) {
         let nothing = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let (min, max) = (0..n)
@@ -112,6 +131,19 @@ impl PointBvh {
             .fold(|| nothing, |(min, max), i| (min.min(point(i)), max.max(point(i))))
             .reduce(|| nothing, |a, b| (a.0.min(b.0), a.1.max(b.1)));
         self.grid = Grid::new(min, max);
+        match self.point_order {
+            PointOrder::Morton => self.sort_by_key(n, point),
+            PointOrder::Median => {
+                let numbered = |i: usize| (point(i), i as u32);
+                (0..n).into_par_iter().with_min_len(8192).map(numbered).collect_into_vec(&mut self.numbered);
+                median::sort(&mut self.numbered);
+                self.numbered.par_iter().with_min_len(8192).map(|p| p.1).collect_into_vec(&mut self.order);
+            }
+        }
+        self.order.resize(n.next_multiple_of(WIDTH), u32::MAX);
+    }
+
+    fn sort_by_key(&mut self, n: usize, point: &(impl Fn(usize) -> Vec3 + Sync)) {
         let grid = self.grid;
         let key = |i: usize| grid.key(point(i));
         // The upper half of each key before the index; the few that agree in it are sorted by the whole key.
@@ -124,14 +156,17 @@ impl PointBvh {
             if run.len() < 20 { run.sort_by_key(whole) } else { run.sort_by_cached_key(whole) }
         }
         self.words.par_iter().with_min_len(8192).map(|&word| word as u32).collect_into_vec(&mut self.order);
-        self.order.resize(n.next_multiple_of(WIDTH), u32::MAX);
         let firsts = self.words.par_iter().step_by(WIDTH).with_min_len(8192);
         firsts.map(|&word| (word >> 32) as u32).collect_into_vec(&mut self.firsts);
     }
 
-    /// Leaves about the place that a point would have in Morton order: one, and more where `k` needs them.
+    /// Leaves about the place that a point would have in Morton order: one, and more where `k` needs them; none in an
+    /// order whose boxes do not overlap, where the nearest of them is the best start.
     #[inline]
     pub(super) fn leaves_about(&self, p: Vec3, k: usize) -> Range<u32> {
+        if self.firsts.is_empty() {
+            return 0..0;
+        }
         let key = (self.grid.key(p) >> LOWER) as u32;
         let place = self.firsts.partition_point(|&first| first <= key).saturating_sub(1);
         let more = k / WIDTH;
@@ -148,7 +183,8 @@ impl PointBvh {
         &self.order[..self.n]
     }
 
-    /// The boxes (least and largest corner) of all levels, level 0 first, without padding: what the GPU builds.
+    /// The boxes (least and largest corner) of all levels, level 0 first, without padding: what the GPU builds from points
+    /// in Morton order.
     pub fn boxes(&self) -> Vec<(Vec3, Vec3)> {
         let mut boxes = Vec::new();
         let mut n = self.n;

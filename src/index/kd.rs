@@ -11,6 +11,7 @@ use glam::Vec3;
 
 use super::blocks::{self, Blocks, Hits, NOTHING, Walk, bounds, join, splat};
 use super::lanes::{Lanes, WIDTH};
+use super::median::{Numbered, both, halve};
 use super::stats::{CountVisits, Hierarchy, Node, Tally, Visits};
 use super::{Error, Nearest, RadiusSearch, check_points};
 
@@ -18,8 +19,6 @@ use super::{Error, Nearest, RadiusSearch, check_points};
 const LEAF_BLOCKS: usize = 2;
 /// Ranges are halved at most this often.
 const MAX_DEPTH: usize = 32;
-/// Points below which a subtree is built on one thread.
-const SERIAL: usize = 4096;
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Split {
@@ -37,7 +36,7 @@ pub struct KdTree {
     /// At b, the split of the range whose second half begins with block b.
     splits: Vec<Split>,
     blocks: Blocks,
-    sorted: Vec<(Vec3, u32)>,
+    sorted: Vec<Numbered>,
 }
 
 impl KdTree {
@@ -87,15 +86,12 @@ fn square([x, y, z]: [f32; 3]) -> f32 {
 }
 
 /// Sorts the points of a range, and fills in its splits.
-fn split(points: &mut [(Vec3, u32)], splits: &mut [Split]) {
+fn split(points: &mut [Numbered], splits: &mut [Split]) {
     if splits.len() <= LEAF_BLOCKS {
         return;
     }
-    let (min, max) = points.iter().fold(NOTHING, |b, &(p, _)| join(b, (p, p)));
-    let axis = (max - min).max_position();
     let middle = splits.len() / 2;
-    // Ties in order of the index, so that the tree does not depend on threads.
-    points.select_nth_unstable_by(middle * WIDTH, |a, b| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1)));
+    let axis = halve(points, middle * WIDTH);
     let (first, second) = points.split_at_mut(middle * WIDTH);
     splits[middle] = Split {
         first_max: first.iter().map(|p| p.0[axis]).fold(f32::NEG_INFINITY, f32::max),
@@ -104,12 +100,7 @@ fn split(points: &mut [(Vec3, u32)], splits: &mut [Split]) {
     };
     // A range's own split is at its middle: no half of it begins or ends there.
     let (first_splits, second_splits) = splits.split_at_mut(middle);
-    if first.len() < SERIAL {
-        split(first, first_splits);
-        split(second, second_splits);
-    } else {
-        rayon::join(|| split(first, first_splits), || split(second, second_splits));
-    }
+    both(first.len(), || split(first, first_splits), || split(second, second_splits));
 }
 
 impl Walk for KdTree {

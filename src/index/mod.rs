@@ -8,7 +8,8 @@
 //!
 //! | points and queries | index |
 //! |---|---|
-//! | any; several radii, or one a query; k-NN; the same tree on the GPU | [`PointBvh`] |
+//! | any; several radii, or one a query; points that are soon others; the same tree on the GPU | [`PointBvh::new`] |
+//! | the same for points that stay and are asked much; k-NN | [`PointBvh::with_order`], [`PointOrder::Median`] |
 //! | one radius for all, asked many times; k-NN within a radius that few points are in | [`HashGrid`] |
 //! | radii far below the largest | not a grid or inflated boxes, which look as far as the largest: [`PointBvh`], [`KdTree`] |
 //! | a handful, or to check another index by | [`BruteForce`] |
@@ -39,6 +40,7 @@ mod grid;
 mod kd;
 mod kd_buffered;
 mod lanes;
+mod median;
 mod nearest;
 mod packet;
 mod queries_as_boxes;
@@ -53,7 +55,7 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 
 pub use batch::{NearestLists, Neighbours, Radii};
-pub use bvh::PointBvh;
+pub use bvh::{PointBvh, PointOrder};
 pub use grid::{HashGrid, QueryOrder};
 pub use kd::KdTree;
 pub use kd_buffered::{Buffers, KdBuffered};

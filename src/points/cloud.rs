@@ -8,8 +8,8 @@ use crate::index::{MAX_K, NearestLists, PointBvh, Radii, RadiusSearch};
 
 /// Size of a coordinate, at most: its square and sums of squares stay finite.
 pub const MAX_COORDINATE: f64 = 1e100;
-/// Points asked for the spacing of a cloud.
-const SPACING_SAMPLES: usize = 16_384;
+/// Points asked for the spacing of a cloud, or for its middle.
+const SAMPLES: usize = 16_384;
 /// Of which coincident points may hide the nearest distinct one.
 const SPACING_K: usize = 8;
 /// Points whose sums are taken by one thread: fixed, so that sums do not depend on the number of threads.
@@ -55,16 +55,13 @@ impl Cloud {
     }
 }
 
-/// Least and largest corner; None without points.
-pub(super) fn bounds(positions: &[DVec3]) -> Option<(DVec3, DVec3)> {
-    positions.par_iter().with_min_len(CHUNK).map(|&p| (p, p)).reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))
-}
-
-/// Coordinates for the search: the cloud's centre at the origin, its longest side between 1/2 and 1.
+/// Coordinates for the search: the median of each coordinate at the origin, half of the points elsewhere within 1 of it.
 ///
-/// The scale is a power of two, so only the origin costs rounding: 2⁻²⁵ of the longest side, which one stray point far
-/// off makes long: remove such points first. With it a cloud gives the
-/// same answers in millimetres and in kilometres, and squared distances neither overflow nor vanish.
+/// The scale is a power of two, so it costs no rounding; a position is rounded by 2⁻²⁴ of its distance from the origin
+/// along each axis. Stray points, as long as they are fewer than half, cost the others no precision, however far off. With
+/// the scale a cloud gives the same answers in millimetres and in kilometres, and squared distances between the points
+/// about the origin neither overflow nor vanish. What lies more than 10¹⁸ off is moved there: far from the rest, but no
+/// longer told apart. The tree's grid spans stray points too: from some 10⁶ off on, searches are exact but slow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
     origin: DVec3,
@@ -74,10 +71,20 @@ pub struct Frame {
 impl Frame {
     /// That of a cloud.
     pub fn of(positions: &[DVec3]) -> Self {
-        let Some((min, max)) = bounds(positions) else { return Self { origin: DVec3::ZERO, scale: 1.0 } };
-        let side = (max - min).max_element();
-        let scale = if side > 0.0 { (-side.log2().ceil()).clamp(-1000.0, 1000.0).exp2() } else { 1.0 };
-        Self { origin: 0.5 * (min + max), scale }
+        let Some(&first) = positions.first() else { return Self { origin: DVec3::ZERO, scale: 1.0 } };
+        let step = positions.len().div_ceil(SAMPLES);
+        let sample: Vec<DVec3> = positions.iter().copied().step_by(step).collect();
+        let one_place = Self { origin: first, scale: 1.0 };
+        Self::of_sample(&sample).or_else(|| Self::of_sample(positions)).unwrap_or(one_place)
+    }
+
+    /// By the upper medians; None if all are in one place.
+    fn of_sample(positions: &[DVec3]) -> Option<Self> {
+        let middle = |axis: usize| median(positions.iter().map(|p| p[axis]).collect());
+        let origin = DVec3::new(middle(0)?, middle(1)?, middle(2)?);
+        let sizes = positions.iter().map(|&p| (p - origin).abs().max_element());
+        let size = median(sizes.filter(|&size| size > 0.0).collect())?;
+        Some(Self { origin, scale: (-size.log2().ceil()).clamp(-1000.0, 1000.0).exp2() })
     }
 
     /// A position in the frame; what lies further off than squares reach is moved nearer, and is still far from all.
@@ -133,14 +140,18 @@ impl<'a> Indexed<'a> {
     /// The `k` nearest points of each query within `radius` (cloud's unit, may be infinite; slightly more is found, for
     /// the rounding in the frame). Distances are the frame's.
     pub fn nearest(&self, queries: &[DVec3], radius: f64, k: usize) -> Result<NearestLists, Error> {
-        let rounding = 1e-6 * (1.0 + self.frame.length(radius));
-        let radius = (self.frame.length(radius) + rounding) as f32;
-        Ok(self.tree.nearest_all(&self.frame.locals(queries), Radii::One(radius), k)?)
+        let radius = self.frame.length(radius);
+        let queries = self.frame.locals(queries);
+        // None for a negative radius, which the search refuses.
+        let rounding = if radius < 0.0 { 0.0 } else { 1e-6 };
+        let radius = |q: &Vec3| (radius + rounding * (1.0 + radius + f64::from(q.abs().max_element()))) as f32;
+        let radii: Vec<f32> = queries.iter().map(radius).collect();
+        Ok(self.tree.nearest_all(&queries, Radii::Each(&radii), k)?)
     }
 
     /// Median distance of a point to the nearest one that is elsewhere, cloud's unit; None if there is no such.
     pub fn spacing(&self) -> Option<f64> {
-        let step = self.positions.len().div_ceil(SPACING_SAMPLES).max(1);
+        let step = self.positions.len().div_ceil(SAMPLES).max(1);
         let asked: Vec<DVec3> = self.positions.iter().copied().step_by(step).collect();
         // More where each position occurs many times.
         self.spacing_among(&asked, SPACING_K).or_else(|| self.spacing_among(&asked, MAX_K))

@@ -100,7 +100,8 @@ fn around(i: usize, n: usize) -> DVec3 {
     DVec3::new(r * cos, r * sin, z)
 }
 
-/// `points` samples of a shape, scanner by scanner and line by line; `noise` is the standard deviation along the ray.
+/// `points` samples of a shape, scanner by scanner and line by line; `noise` is the standard deviation along the ray,
+/// at most 1e37: beyond, positions overflow 32 bits.
 /// The same seed gives the same cloud, another the same surface with its samples elsewhere.
 pub fn scan(shape: Shape, points: usize, noise: f64, seed: u32) -> Cloud {
     let share = raster(shape, PROBE, 0.0, seed).len() as f64 / (SCANNERS * PROBE * PROBE) as f64;

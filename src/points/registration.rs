@@ -5,7 +5,7 @@ use glam::{DQuat, DVec3, Vec3};
 use nalgebra::{SymmetricEigen, Vector6};
 use rayon::prelude::*;
 
-use super::cloud::{CHUNK, bounds, median};
+use super::cloud::{CHUNK, median};
 use super::rigid::{chunked, fit};
 use super::{Error, Indexed, Match, Rigid, automatic_outlier, correspond};
 
@@ -37,7 +37,7 @@ pub struct Settings {
     pub outlier: Option<f64>,
     /// At most.
     pub iterations: usize,
-    /// Converged once a step moves no point by more than this share of the target's size (the diagonal of its box).
+    /// Converged once a step moves no matched point by more than this share of the diagonal of their box.
     pub tolerance: f64,
 }
 
@@ -100,7 +100,6 @@ pub fn register(
             Some(normals)
         }
     };
-    let size = bounds(target.positions()).map_or(0.0, |(min, max)| min.distance(max));
     let least_outlier = automatic_outlier(target);
     let mut found = Registration { motion: Rigid::IDENTITY, iterations: Vec::new(), converged: false, free: 0 };
     for iteration in 0..=settings.iterations {
@@ -144,7 +143,7 @@ pub fn register(
             }
         };
         found.motion = step.after(&found.motion);
-        found.converged = reach(&step, &moved) <= settings.tolerance * size;
+        found.converged = reach(&step, &pairs) <= settings.tolerance;
     }
     Ok(found)
 }
@@ -166,13 +165,14 @@ fn pairs(moved: &[DVec3], target: &Indexed, normals: Option<&[Vec3]>, matches: &
     moved.par_iter().zip(matches).with_min_len(CHUNK).filter_map(pair).collect()
 }
 
-/// The farthest that a step moves any point: at a corner of their box.
-fn reach(step: &Rigid, moved: &[DVec3]) -> f64 {
-    let Some((min, max)) = bounds(moved) else { return 0.0 };
+/// The farthest that a step moves a corner of the pairs' box, and so at least as far as any of them, over its diagonal.
+fn reach(step: &Rigid, pairs: &[Pair]) -> f64 {
+    let corners = pairs.iter().map(|pair| (pair.from, pair.from)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let Some((min, max)) = corners else { return 0.0 };
     let corner = |i: usize| {
         DVec3::from_array(std::array::from_fn(|axis| if i >> axis & 1 == 0 { min[axis] } else { max[axis] }))
     };
-    (0..8).map(corner).map(|c| step.apply(c).distance(c)).fold(0.0, f64::max)
+    (0..8).map(corner).map(|c| step.apply(c).distance(c)).fold(0.0, f64::max) / min.distance(max)
 }
 
 /// The small motion that brings the points to the planes, and the number of motions that the planes leave free.

@@ -11,6 +11,7 @@ use sunfleck::ppm::{Error, Stages, film};
 use sunfleck::scene::PackedScene;
 
 pub use crate::gpu_search::context;
+use crate::gpu_search::meagre_device;
 
 /// One set of buffers for the tests that need no scene.
 fn stages() -> Option<MutexGuard<'static, GpuStages>> {
@@ -265,6 +266,18 @@ fn ray_queries_refuse_radii_above_the_built_one() {
     }
     gpu.build_index(&frame).expect("build");
     gpu.gather(&frame).expect("gather");
+}
+
+/// The constants of a scene do not fit: an error, though nobody handles what the device says.
+#[test]
+fn what_a_device_of_ones_own_refuses_is_an_error() {
+    let context = meagre_device(|limits| {
+        limits.max_storage_buffers_per_shader_stage = 11;
+        limits.max_uniform_buffer_binding_size = 64;
+    });
+    let Some(context) = context else { return };
+    let made = GpuStages::new(context, &PackedScene::default(), Camera::default()).map(drop);
+    assert!(matches!(&made, Err(error) if error.to_string().contains("64")), "{made:?}");
 }
 
 #[test]

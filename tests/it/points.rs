@@ -105,8 +105,48 @@ fn the_automatic_outlier_distance_suits_the_sampling() {
         let found = correspond(&away, &indexed, outlier).unwrap();
         assert!(!found.iter().any(|m| m.is_some()), "{name}");
     }
-    let twice = [uniform(500, 0), uniform(500, 0)].concat();
-    assert!(automatic_outlier(&Indexed::new(&twice).unwrap()) > 0.1, "coincident points hide the spacing");
+    let once = automatic_outlier(&Indexed::new(&uniform(500, 0)).unwrap());
+    for times in [2, 10, 50] {
+        let outlier = automatic_outlier(&Indexed::new(&uniform(500, 0).repeat(times)).unwrap());
+        assert!(
+            (outlier / once - 1.0).abs() < 0.05,
+            "{times}: coincident points hide the spacing, {outlier} for {once}"
+        );
+    }
+}
+
+/// Distances of a stray point from a cloud of size 2.
+const STRAY: [f64; 4] = [1e3, 1e6, 1e12, 1e30];
+
+#[test]
+fn a_stray_point_costs_the_others_nothing() {
+    let (target, source) = (uniform(3000, 0), uniform(1000, 1));
+    let expected = correspond(&source, &Indexed::new(&target).unwrap(), 0.1).unwrap();
+    for far in STRAY {
+        // The stray points match too, where the search's rounding may exceed the outlier distance.
+        let mut target = target.clone();
+        target.extend([DVec3::new(far, -0.5 * far, 0.0), DVec3::new(0.0, far, far) * 0.9]);
+        let mut source = source.clone();
+        source.extend([target[3000] + DVec3::Z * 0.01, target[3001] - DVec3::X * 0.01]);
+        let found = correspond(&source, &Indexed::new(&target).unwrap(), 0.1).unwrap();
+        assert!(found[..1000] == expected, "{far}");
+        assert_eq!((found[1000].index, found[1001].index), (3000, 3001), "{far}");
+    }
+}
+
+#[test]
+fn stray_points_are_matched_too() {
+    // Where 32 bits are 1/16 apart, counterparts 0.09 away may look farther than 0.1.
+    let far = |i: usize| DVec3::X * (1e6 + i as f64);
+    let target: Vec<DVec3> = uniform(3000, 0).into_iter().chain((0..100).map(far)).collect();
+    let source: Vec<DVec3> = (0..100).map(|i| far(i) + DVec3::X * (0.05 + 0.0004 * i as f64)).collect();
+    let found = correspond(&source, &Indexed::new(&target).unwrap(), 0.1).unwrap();
+    assert!(found.iter().map(|m| m.index).eq(3000..3100), "{found:?}");
+    // Most of the points in one place, in a small unit.
+    let target: Vec<DVec3> =
+        [vec![DVec3::ZERO; 600], uniform(500, 0)].concat().into_iter().map(|p| p * 1e-40).collect();
+    let found = correspond(&target[600..], &Indexed::new(&target).unwrap(), f64::INFINITY).unwrap();
+    assert!(found.iter().map(|m| m.index).eq(600..1100), "{found:?}");
 }
 
 #[test]

@@ -17,6 +17,7 @@ use super::hardware::Hardware;
 use super::index::{Index, Sorted};
 use super::kernels::{ACCELERATION_STRUCTURE, Access, Batch, Kernel, Modules, Shared};
 use super::timer::Timer;
+use crate::device;
 use crate::layout::{Camera, EyeVertex, Frame, Photon, PointBox};
 use crate::ppm::{Error, Film, StageTimes, Stages};
 use crate::scene::PackedScene;
@@ -89,6 +90,11 @@ impl GpuStages {
         camera: Camera,
         method: Method,
     ) -> Result<Self, Error> {
+        let guard = Arc::clone(&context);
+        Ok(guard.guarded(|| Self::make(context, scene, camera, method))?)
+    }
+
+    fn make(context: Arc<Context>, scene: &PackedScene, camera: Camera, method: Method) -> Result<Self, device::Error> {
         use Access::{Read, Write};
         let (scene, groups) = SceneBuffers::new(&context, scene, &camera)?;
         let shared = Shared::new(&context, groups);
@@ -212,8 +218,8 @@ impl Stages for GpuStages {
     fn trace_eye(&mut self, frame: &Frame) -> Result<(), Error> {
         let n_pixels = frame.width * frame.height;
         self.reserve_pixels(n_pixels)?;
-        self.scene.set_frame(&self.context, frame);
         let mut batch = Batch::new(&self.context, &self.shared, "eye");
+        self.scene.set_frame(&batch, frame);
         self.timer.begin(EYE, &mut batch);
         for (first, rows) in Self::chunks(frame, self.eye_chunk) {
             if first > 0 {
@@ -250,8 +256,8 @@ impl Stages for GpuStages {
                 hardware.reserve(&self.context, n)?;
             }
         }
-        self.scene.set_frame(&self.context, frame);
         let mut batch = Batch::new(&self.context, &self.shared, "build");
+        self.scene.set_frame(&batch, frame);
         self.timer.begin(BUILD, &mut batch);
         let photons = self.photons.all();
         match &mut self.hardware {
@@ -282,8 +288,8 @@ impl Stages for GpuStages {
                 hardware.tree(&self.context, query, largest * frame.radius_scale)?
             }
         };
-        self.scene.set_frame(&self.context, frame);
         let mut batch = Batch::new(&self.context, &self.shared, "gather");
+        self.scene.set_frame(&batch, frame);
         self.timer.begin(GATHER, &mut batch);
         for (first, rows) in Self::chunks(frame, self.gather_chunk) {
             if first > 0 {
@@ -306,8 +312,8 @@ impl Stages for GpuStages {
 
     fn accumulate(&mut self, frame: &Frame) -> Result<(), Error> {
         self.check_pixels(frame)?;
-        self.scene.set_frame(&self.context, frame);
         let mut batch = Batch::new(&self.context, &self.shared, "accumulate");
+        self.scene.set_frame(&batch, frame);
         self.timer.begin(ACCUMULATE, &mut batch);
         if frame.iteration <= 1 {
             batch.encoder().clear_buffer(self.film.raw(), 0, None);

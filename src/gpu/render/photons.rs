@@ -99,8 +99,8 @@ impl PhotonPaths {
         room: u32,
         timer: &mut Timer<N_STAGES>,
     ) -> Result<(), Error> {
-        scene.set_frame(context, frame);
         let mut batch = Batch::new(context, shared, "photons");
+        scene.set_frame(&batch, frame);
         timer.begin(PHOTONS, &mut batch);
         batch.encoder().clear_buffer(self.counters.raw(), 0, Some(u64::from(4 * N_TOTALS)));
         for first in (0..frame.n_paths).step_by((CHUNK * PATHS) as usize) {

@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use crate::device::Error;
 use crate::gpu::buffers::Array;
 use crate::gpu::context::Context;
-use crate::gpu::kernels::{Access, Group, storage, uniform};
+use crate::gpu::kernels::{Access, Batch, Group, storage, uniform};
 use crate::layout::{Camera, Frame, LIGHT_AREA, LIGHT_ENVIRONMENT, Primitive, SceneInfo, SceneNode, Vertex};
 use crate::scene::PackedScene;
 
@@ -79,9 +79,9 @@ impl SceneBuffers {
         Ok((Self { frame, _arrays: arrays }, groups))
     }
 
-    /// Constants of the dispatches submitted from now on.
-    pub(super) fn set_frame(&self, context: &Context, frame: &Frame) {
-        context.queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(frame));
+    /// Constants of this batch and those submitted after it.
+    pub(super) fn set_frame(&self, batch: &Batch<'_>, frame: &Frame) {
+        batch.write(&self.frame, bytemuck::bytes_of(frame));
     }
 }
 

@@ -96,8 +96,13 @@ impl PointSearch {
     }
 
     fn with(context: Arc<Context>, method: Method, max_radius: f32) -> Result<Self, Error> {
-        use Access::{Read, Write};
         check_max_radius(max_radius)?;
+        let guard = Arc::clone(&context);
+        guard.guarded(|| Self::make(context, method, max_radius))
+    }
+
+    fn make(context: Arc<Context>, method: Method, max_radius: f32) -> Result<Self, Error> {
+        use Access::{Read, Write};
         let shared = Arc::new(Shared::new(&context, Vec::new()));
         let modules = Modules::new(&context, &shared);
         let index = Index::new(&modules, &Sorted { permute: ("points", "sort_points"), words: WORDS })?;

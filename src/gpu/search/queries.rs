@@ -91,22 +91,19 @@ impl Records {
     }
 }
 
-/// What is bound even where there is nothing: one word.
-const LEAST_BYTES: u64 = 4;
-
-/// The first bytes of a buffer.
+/// The first bytes of a buffer. Without any it must not be bound.
 fn part(buffer: &wgpu::Buffer, bytes: u64) -> wgpu::BindingResource<'_> {
-    let size = wgpu::BufferSize::new(bytes.max(LEAST_BYTES));
+    let size = wgpu::BufferSize::new(bytes);
     wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size })
 }
 
-/// Refuses a buffer that cannot be bound, or has less than `bytes`.
+/// Refuses a buffer that cannot be bound, or has less than `bytes`. One of which nothing is needed may be empty, which
+/// cannot be bound: no kernel runs then.
 fn check_buffer(context: &Context, what: &'static str, buffer: &wgpu::Buffer, bytes: u64) -> Result<(), Error> {
     let refused = |problem: String| Err(Error::Buffer { what, problem });
     if !buffer.usage().contains(wgpu::BufferUsages::STORAGE) {
         return refused("has no usage STORAGE".to_owned());
     }
-    let bytes = bytes.max(LEAST_BYTES);
     if buffer.size() < bytes {
         return refused(format!("has {} bytes, {bytes} are needed", buffer.size()));
     }

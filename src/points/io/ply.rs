@@ -153,8 +153,9 @@ fn header_text(input: &mut impl BufRead) -> Result<Vec<u8>, String> {
     for at in 1.. {
         line.clear();
         let n = input.read_until(b'\n', &mut line).map_err(|e| plain(&e))?;
-        text.extend_from_slice(&line);
+        // Comments may be in any encoding that keeps ASCII.
         let words = String::from_utf8_lossy(&line);
+        text.extend_from_slice(words.as_bytes());
         let words: Vec<&str> = words.split_ascii_whitespace().collect();
         if at == 1 && words != ["ply"] {
             return Err("does not begin with a line \"ply\": not a PLY file".into());

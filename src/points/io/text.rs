@@ -8,21 +8,26 @@ use super::{MAX_POINTS, plain, shorten};
 use crate::points::cloud::MAX_COORDINATE;
 use crate::points::{Cloud, Precision};
 
-/// Bytes of one line, at most.
+/// Bytes of one line that are looked at: what is left out may go on beyond.
 const MAX_LINE: u64 = 1 << 16;
+/// U+FEFF in UTF-8.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// Three columns behind the position are normals if their lengths are this near to 1.
 const UNIT_LENGTH: f64 = 0.05;
 
 /// XYZ: a point a line, 3 or 6 columns between blanks, commas or semicolons; `#` and `//` begin comments.
+/// They may be in any encoding that keeps ASCII, and of any length.
 ///
 /// Columns 4 to 6 are normals if all are of unit length or zero, colours if all are whole numbers from 0 to 255. The
 /// error says which line.
 pub fn read_xyz(input: impl BufRead) -> Result<Cloud, String> {
     let (mut positions, mut rest) = (Vec::new(), Vec::new());
     let mut columns = None;
-    lines(input, |line| {
-        let line = line.split(['#']).next().unwrap_or("");
-        let line = line.split("//").next().unwrap_or("");
+    let data = |line: &[u8]| {
+        let comment = |i: &usize| line[*i] == b'#' || line[*i..].starts_with(b"//");
+        (0..line.len()).find(comment).unwrap_or(line.len())
+    };
+    lines(input, data, |line| {
         let words = line.split([' ', '\t', ',', ';', '\r']).filter(|w| !w.is_empty());
         let mut row = [0.0; 6];
         let mut n = 0;
@@ -59,12 +64,19 @@ pub fn read_xyz(input: impl BufRead) -> Result<Cloud, String> {
     Ok(cloud)
 }
 
-/// OBJ: the `v` lines, with their colours (`v x y z r g b`, 0 … 1) if all have them; nothing else is looked at.
+/// OBJ: the `v` lines, with their colours (`v x y z r g b`, 0 … 1) if all have them, up to a `#`; nothing else is looked
+/// at, so that other lines may be of any length and in any encoding that keeps ASCII.
 pub fn read_obj(input: impl BufRead) -> Result<Cloud, String> {
     let (mut positions, mut colours) = (Vec::new(), Vec::new());
-    lines(input, |line| {
+    let vertex = |line: &[u8]| match line.trim_ascii_start() {
+        [b'v', rest @ ..] if rest.first().is_none_or(u8::is_ascii_whitespace) => {
+            line.iter().position(|b| *b == b'#').unwrap_or(line.len())
+        }
+        _ => 0,
+    };
+    lines(input, vertex, |line| {
         let mut words = line.split_ascii_whitespace();
-        if words.next() != Some("v") {
+        if words.next().is_none() {
             return Ok(());
         }
         let mut row = [0.0; 7];
@@ -87,8 +99,14 @@ pub fn read_obj(input: impl BufRead) -> Result<Cloud, String> {
     Ok(Cloud { positions, normals: None::<Vec<Vec3>>, colours, precision: Precision::Double })
 }
 
-/// Calls `each` with every line; an error gets its number.
-fn lines(mut input: impl BufRead, mut each: impl FnMut(&str) -> Result<(), String>) -> Result<(), String> {
+/// Calls `each` with the beginning of every line, as many bytes as `wanted` says; an error gets the line's number.
+///
+/// The rest is left out: it need not be text, nor end within [`MAX_LINE`].
+fn lines(
+    mut input: impl BufRead,
+    wanted: impl Fn(&[u8]) -> usize,
+    mut each: impl FnMut(&str) -> Result<(), String>,
+) -> Result<(), String> {
     let mut bytes = Vec::new();
     for at in 1.. {
         bytes.clear();
@@ -97,14 +115,23 @@ fn lines(mut input: impl BufRead, mut each: impl FnMut(&str) -> Result<(), Strin
         if n == 0 {
             break;
         }
-        if n as u64 == MAX_LINE {
-            return Err(fail(format!("longer than {MAX_LINE} bytes")));
-        }
         if at > MAX_POINTS {
             return Err(fail("too many lines".into()));
         }
-        let line = std::str::from_utf8(&bytes).map_err(|_| fail("not text".into()))?;
-        each(line.trim_start_matches('\u{feff}').trim_end_matches(['\n', '\r'])).map_err(fail)?;
+        let line = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&bytes);
+        let (wanted, rest) = line.split_at(wanted(line));
+        // UTF-16 looks as if nothing were wanted.
+        if line.contains(&0) {
+            return Err(fail("not text".into()));
+        }
+        if n as u64 == MAX_LINE && !bytes.ends_with(b"\n") {
+            if rest.is_empty() {
+                return Err(fail(format!("longer than {MAX_LINE} bytes")));
+            }
+            input.skip_until(b'\n').map_err(|e| fail(plain(&e)))?;
+        }
+        let text = std::str::from_utf8(wanted).map_err(|_| fail("not text".into()))?;
+        each(text.trim_end_matches(['\n', '\r'])).map_err(fail)?;
     }
     Ok(())
 }

@@ -30,10 +30,11 @@ pub fn grid(points: &[Vec3], radius: f32, query_order: QueryOrder) -> HashGrid {
 macro_rules! for_every_index {
     ($points:expr, $built:expr, $check:ident $(, $more:expr)*) => {{
         use $crate::indices::{Boxes, LBVH, PLOC, grid, sample_bvh};
-        use sunfleck::index::{BruteForce, KdBuffered, KdTree, PointBvh, QueryOrder};
+        use sunfleck::index::{BruteForce, KdBuffered, KdTree, PointBvh, PointOrder, QueryOrder};
         let (points, built): (&[glam::Vec3], f32) = ($points, $built);
         $check("brute force", &BruteForce(points) $(, $more)*);
         $check("point BVH", &PointBvh::new(points).unwrap() $(, $more)*);
+        $check("point BVH, median", &PointBvh::with_order(points, PointOrder::Median).unwrap() $(, $more)*);
         $check("grid", &grid(points, built, QueryOrder::AsGiven) $(, $more)*);
         $check("grid, queries sorted", &grid(points, built, QueryOrder::Sorted) $(, $more)*);
         $check("kd-tree", &KdTree::new(points).unwrap() $(, $more)*);

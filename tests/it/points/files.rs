@@ -59,6 +59,17 @@ fn matches_are_written_as_properties() {
     assert_eq!((&rows[36..40], &rows[40..48]), (&(-1_i32).to_le_bytes()[..], &(-1.0_f64).to_le_bytes()[..]));
 }
 
+#[test]
+fn properties_are_written_in_the_stated_order() {
+    let mut bytes = Vec::new();
+    write_ply(&mut bytes, &full(2, Precision::Double), Some(&[Match::NONE; 2])).unwrap();
+    let header = String::from_utf8_lossy(&bytes);
+    let lines = header.lines().take_while(|l| *l != "end_header");
+    let names: Vec<&str> = lines.filter_map(|l| l.strip_prefix("property ")?.split(' ').nth(1)).collect();
+    let expected = "x y z nx ny nz red green blue alpha match distance";
+    assert_eq!(names.join(" "), expected);
+}
+
 /// The same two vertices in all encodings: an element and a list before them, types of all sizes.
 #[test]
 fn all_encodings_of_ply_are_read() {
@@ -133,6 +144,38 @@ fn text_clouds_are_read() {
     assert_eq!(cloud.colours, Some(vec![[255, 0, 128, 255]]));
 }
 
+/// Comments in Latin-1, and lines that nothing is taken from, however long they are.
+#[test]
+fn what_is_left_out_need_not_be_text() {
+    let points = [DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 5.0, 6.0)];
+    let long = b" 1".repeat(1 << 16);
+    let xyz = [b"# M\xfcller\n1 2 3 // \xe9\n#", &long[..], b"\xff\n4 5 6 #", &long].concat();
+    assert_eq!(read_xyz(&xyz[..]).unwrap().positions, points);
+    let obj = [
+        b"# M\xfcller\r\no caf\xe9\nv 1 2 3 # \xe9\r\nf",
+        &long[..],
+        b"\nmtllib \xfc.mtl\nv 4 5 6 #",
+        &long,
+        b"\nf 1 2",
+        &long,
+    ]
+    .concat();
+    assert_eq!(read_obj(&obj[..]).unwrap().positions, points);
+    let header = b"ply\nformat ascii 1.0\ncomment M\xfcller\nelement vertex 1\nproperty float x\nproperty float y\n\
+        property float z\nend_header\n1 2 3\n";
+    assert_eq!(ply(header).unwrap().positions, points[..1]);
+    // What is wanted must be text, and bounded.
+    for (data, says) in [
+        (&b"v 1 2 3\nv 1 2 \xe9\n"[..], "line 2: not text"),
+        (b"\xff\xfev\0 \x001\0 \x002\0 \x003\0\n\0", "line 1: not text"),
+        (&[b"v", &long[..], b"\n"].concat(), "line 1: longer than 65536 bytes"),
+        (b"v", "line 1: a vertex of 0 numbers"),
+    ] {
+        assert_eq!(read_obj(data).unwrap_err(), says);
+    }
+    assert_eq!(read_xyz(&b"1 2 3\n1 2 3\xe9\n"[..]).unwrap_err(), "line 2: not text");
+}
+
 #[test]
 fn malformed_text_is_refused() {
     for (text, says) in [
@@ -144,6 +187,7 @@ fn malformed_text_is_refused() {
         ("1 -inf 3\n", "line 1: y is -inf"),
         ("1e200 2 3\n", "line 1: x is 1"),
         ("1 2 3 0.5 7 900\n", "neither unit normals nor colours"),
+        ("1 2 3 0 0 0.9\n", "neither unit normals nor colours"),
     ] {
         let error = read_xyz(text.as_bytes()).unwrap_err();
         assert!(error.contains(says), "{text:?}: {error}");
@@ -357,6 +401,8 @@ fn the_program_refuses_in_one_line() {
         ("register line.xyz line.xyz -o o.ply --method surface", 2, "invalid value 'surface'"),
         ("make cube -o o.ply", 2, "invalid value 'cube'"),
         ("make -o o.ply --points 200M", 2, "at most 100M"),
+        ("make -o o.ply --noise 1e39", 2, "for '--noise <LENGTH>': must be 0 to 1e6"),
+        ("make -o o.ply --noise -1", 2, "for '--noise <LENGTH>': must be 0 to 1e6"),
         ("", 2, "subcommand"),
     ] {
         let output = sunfleck(at, &format!("points {line}"));

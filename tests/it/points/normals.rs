@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use sunfleck::points::generate::{SHAPES, Shape, scan};
 use sunfleck::points::{Error, Indexed, estimate, orient};
 
-use super::{degenerate, random, sphere};
+use super::{STRAY, degenerate, random, sphere, uniform};
 
 /// Estimated and oriented, with the number of pieces.
 fn normals(cloud: &[DVec3], k: usize) -> (Vec<Vec3>, usize) {
@@ -32,6 +32,18 @@ fn a_sphere_has_its_radii() {
         assert_eq!((pieces, wrong), (1, 0), "k {k}");
         assert!(mean < 1.0 && largest < 3.0, "k {k}: mean {mean}, largest {largest}");
         assert!(found.iter().all(|n| (n.length() - 1.0).abs() < 1e-5));
+    }
+}
+
+#[test]
+fn a_normal_is_of_the_k_nearest_points() {
+    let cloud = uniform(60, 12);
+    let found = estimate(&Indexed::new(&cloud).unwrap(), 3).unwrap().normals;
+    for (n, p) in found.iter().zip(&cloud) {
+        let mut near = cloud.clone();
+        near.sort_by(|a, b| a.distance(*p).total_cmp(&b.distance(*p)));
+        let plane = (near[1] - *p).cross(near[2] - *p).normalize();
+        assert!(n.as_dvec3().dot(plane).abs() > 1.0 - 1e-6, "{n} {plane}");
     }
 }
 
@@ -67,6 +79,14 @@ fn each_piece_is_oriented_by_itself() {
 }
 
 #[test]
+fn a_narrow_gap_does_not_part_a_surface() {
+    // Wider than a point's 13 nearest reach, and less than four spacings.
+    let cloud: Vec<DVec3> = sphere(5000).into_iter().filter(|p| p.z.abs() > 0.085).collect();
+    let (found, pieces) = normals(&cloud, 8);
+    assert_eq!((pieces, errors(&found, cloud.iter().copied()).2), (1, 0));
+}
+
+#[test]
 fn two_sides_of_a_thin_shell_stay_apart() {
     // Shells 0.06 apart, samples some 0.05: the other side is among the nearest of many points.
     let (outer, inner) = (sphere(5000), sphere(4700));
@@ -79,6 +99,47 @@ fn two_sides_of_a_thin_shell_stay_apart() {
     assert_eq!(agree(0..5000), 1.0, "the outer shell points outward");
     let inside = agree(5000..cloud.len());
     assert!(inside == 0.0 || inside == 1.0, "the inner shell agrees with itself: {inside}");
+}
+
+#[test]
+fn two_sides_of_a_plate_stay_apart() {
+    // A round plate 0.08 thick with a round rim. On its sides the samples are 0.05 apart, so that each has some of the
+    // other side among its nearest 13, and its normal is parallel to theirs.
+    let (mut cloud, mut truth) = (vec![], vec![]);
+    for i in -24_i32..=24 {
+        for j in -24_i32..=24 {
+            let (x, y) = (0.05 * (f64::from(i) + 0.5 * f64::from(j)), 0.05 * 0.75_f64.sqrt() * f64::from(j));
+            for side in [1.0, -1.0] {
+                if x.hypot(y) < 0.48 {
+                    cloud.push(DVec3::new(x, y, 0.04 * side));
+                    truth.push(DVec3::Z * side);
+                }
+            }
+        }
+    }
+    for i in 0..160 {
+        let (sin, cos) = (f64::from(i) / 160.0 * std::f64::consts::TAU).sin_cos();
+        for step in -3..=3 {
+            let (up, out) = (f64::from(step) / 6.0 * std::f64::consts::PI).sin_cos();
+            let normal = DVec3::new(out * cos, out * sin, up);
+            cloud.push(DVec3::new(0.5 * cos, 0.5 * sin, 0.0) + normal * 0.04);
+            truth.push(normal);
+        }
+    }
+    let (found, pieces) = normals(&cloud, 6);
+    assert_eq!((pieces, errors(&found, truth.into_iter()).2), (1, 0));
+}
+
+#[test]
+fn a_stray_point_costs_the_others_nothing() {
+    let cloud = sphere(5000);
+    for far in STRAY {
+        let with: Vec<DVec3> = cloud.iter().copied().chain([DVec3::X * far]).collect();
+        let found = estimate(&Indexed::new(&with).unwrap(), 8).unwrap().normals;
+        let angle = |(n, p): (&Vec3, &DVec3)| n.as_dvec3().dot(*p).abs().min(1.0).acos().to_degrees();
+        let largest = found.iter().zip(&cloud).map(angle).fold(0.0, f64::max);
+        assert!(largest < 3.0, "{far}: {largest}");
+    }
 }
 
 #[test]
@@ -136,6 +197,9 @@ fn degenerate_clouds() {
         (0..2000).map(|i| DVec3::new((i % 100) as f64 * 0.01, (i / 100) as f64 * 0.1, 0.0)).collect();
     let (found, _) = normals(&lines, 8);
     assert!(found.iter().all(|n| n.z.abs() == 1.0 && n.z == found[0].z), "scan lines");
+    // A ribbon, narrow among 64 points too.
+    let ribbon: Vec<DVec3> = (0..500).map(|i| DVec3::new(i as f64 * 0.01, (i % 2) as f64 * 0.001, 0.0)).collect();
+    assert!(normals(&ribbon, 8).0.iter().all(|n| n.z.abs() == 1.0), "ribbon");
 }
 
 #[test]

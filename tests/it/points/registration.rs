@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3, Vec3};
 use sunfleck::points::generate::{Shape, scan};
 use sunfleck::points::{Error, Indexed, Method, Registration, Rigid, Settings, estimate, register};
 
-use super::{degenerate, motion, random, uniform};
+use super::{STRAY, degenerate, motion, random, uniform};
 
 const METHODS: [Method; 2] = [Method::PointToPoint, Method::PointToPlane];
 
@@ -16,6 +16,10 @@ fn icp(source: &[DVec3], target: &[DVec3], settings: Settings) -> Result<Registr
 
 fn with(method: Method) -> Settings {
     Settings { method, ..Settings::default() }
+}
+
+fn with_tolerance(method: Method, tolerance: f64) -> Settings {
+    Settings { tolerance, ..with(method) }
 }
 
 /// About the middle of the cloud, so that the error of the rotation does not show as one of the translation.
@@ -85,6 +89,21 @@ fn another_scan_of_the_surface_is_met() {
 }
 
 #[test]
+fn stray_points_neither_stop_it_nor_keep_it_going() {
+    let target = scan(Shape::Bumpy, 3000, 0.0, 0).positions;
+    let (source, truth) = displaced(&target, 1.0);
+    for far in STRAY {
+        let with = |cloud: &[DVec3], stray: DVec3| cloud.iter().copied().chain([stray]).collect::<Vec<_>>();
+        for method in METHODS {
+            let (source, target) = (with(&source, DVec3::Y * far), with(&target, DVec3::X * far));
+            let found = icp(&source, &target, with_tolerance(method, 1e-9)).unwrap();
+            let (angle, shift) = difference(&found.motion, &truth);
+            assert!(found.converged && angle < 1e-6 && shift < 1e-6, "{method:?} {far}: {angle} {shift}");
+        }
+    }
+}
+
+#[test]
 fn scans_that_overlap_in_part_are_registered() {
     let cloud = scan(Shape::Bumpy, 12_000, 2e-4, 0).positions;
     let target: Vec<DVec3> = cloud.iter().copied().filter(|p| p.z < 0.3).collect();
@@ -127,13 +146,47 @@ fn a_fixed_outlier_distance_is_kept() {
     let far: Vec<DVec3> = target.iter().map(|p| *p + DVec3::X * 10.0).collect();
     let error = icp(&far, &target, settings).unwrap_err();
     assert_eq!(error, Error::Apart { iteration: 0, matches: 0, distance: 0.05 });
+    let two = [&target[..2], &far[2..]].concat();
+    let error = icp(&two, &target, settings).unwrap_err();
+    assert_eq!(error, Error::Apart { iteration: 0, matches: 2, distance: 0.05 });
+    // To a plane only where there is a normal.
+    let normals: Vec<Vec3> = (0..2000).map(|i| if i % 2 == 0 { Vec3::ZERO } else { Vec3::Z }).collect();
+    let plane = Settings { method: Method::PointToPlane, ..settings };
+    let found = register(&target, &Indexed::new(&target).unwrap(), Some(&normals), &plane, |_, _| {}).unwrap();
+    assert_eq!(found.iterations[0].inliers, 0.5);
     let none = icp(&source, &target, Settings { iterations: 0, ..settings }).unwrap();
     assert!(none.motion == Rigid::IDENTITY && none.iterations.len() == 1 && !none.converged);
 }
 
 #[test]
+fn two_iterations_are_one_after_the_other() {
+    let target = scan(Shape::Bumpy, 2000, 0.0, 0).positions;
+    let (source, _) = displaced(&target, 1.0);
+    for method in METHODS {
+        let after = |source: &[DVec3], iterations| {
+            let settings = Settings { iterations, outlier: Some(1.0), ..with(method) };
+            icp(source, &target, settings).unwrap().motion
+        };
+        let first = after(&source, 1);
+        let second = after(&first.apply_all(&source), 1);
+        let (angle, shift) = difference(&after(&source, 2), &second.after(&first));
+        assert!(angle < 1e-9 && shift < 1e-9, "{method:?}: {angle} {shift}");
+        let p = DVec3::new(0.3, 0.5, -0.9);
+        assert!(second.after(&first).apply(p).distance(second.apply(first.apply(p))) < 1e-12);
+    }
+}
+
+#[test]
 fn a_reflection_is_never_taken() {
-    // The best orthogonal map of these is a mirror.
+    // Flat, so that each point is matched to its own mirror image: the best orthogonal map is the mirror.
+    let flat: Vec<DVec3> =
+        (0..49).map(|i| DVec3::new((i % 7) as f64, (i / 7) as f64, 0.1 * random(i, 8)[0] - 0.05)).collect();
+    let mirrored: Vec<DVec3> = flat.iter().map(|p| DVec3::new(p.x, p.y, -p.z)).collect();
+    let found = icp(&mirrored, &flat, with(Method::PointToPoint)).unwrap();
+    assert!(found.converged && found.motion.angle() < 0.05, "{}", found.motion.angle());
+    let last = found.iterations.last().unwrap();
+    assert!(last.inliers == 1.0 && last.rms > 0.01, "{last:?}");
+    // And where it locks in anywhere.
     let target = uniform(50, 2);
     let mirrored: Vec<DVec3> = target.iter().map(|p| DVec3::new(p.x, p.y, -p.z)).collect();
     let found = icp(&mirrored, &target, Settings { outlier: Some(1e9), ..Settings::default() }).unwrap();

@@ -10,10 +10,9 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use glam::Vec3;
 use kiddo::ImmutableKdTree;
-use peers::{Batch, Found, Obvhs, Peer, Single};
+use peers::{Batch, Found, Grid, Median, Morton, Obvhs, Peer, Single};
 use rustix::time::{ClockId, clock_gettime};
 use serde_json::json;
-use sunfleck::index::{HashGrid, PointBvh};
 
 fn main() -> Result<()> {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -22,9 +21,11 @@ fn main() -> Result<()> {
         ["run", library, limit, points, ref cases @ ..] => {
             let job = Job::read(limit.parse()?, points, cases)?;
             match library {
-                "sunfleck" => job.run::<Batch<PointBvh>>(library),
-                "sunfleck-single" => job.run::<Single<PointBvh>>(library),
-                "sunfleck-grid" => job.run::<Batch<HashGrid>>(library),
+                "sunfleck" => job.run::<Batch<Morton>>(library),
+                "sunfleck-single" => job.run::<Single<Morton>>(library),
+                "sunfleck-median" => job.run::<Batch<Median>>(library),
+                "sunfleck-median-single" => job.run::<Single<Median>>(library),
+                "sunfleck-grid" => job.run::<Batch<Grid>>(library),
                 "kiddo" => job.run::<ImmutableKdTree<f32, 3>>(library),
                 "obvhs-ploc" => job.run::<Obvhs<false>>(library),
                 "obvhs-medium" => job.run::<Obvhs<true>>(library),

@@ -10,7 +10,7 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use rstar::RTree;
-use sunfleck::index::{HashGrid, Nearest, PointBvh, Radii, RadiusSearch, distance2};
+use sunfleck::index::{HashGrid, Nearest, PointBvh, PointOrder, Radii, RadiusSearch, distance2};
 
 /// What a query finds: how many, and the sum over them of the kernel 1 − d²/r², or for k-NN of the squared distances.
 #[derive(Clone, Copy, Debug, Default)]
@@ -45,36 +45,52 @@ fn epanechnikov(radius: f32) -> impl Fn(f32) -> f32 + Sync {
     move |d2| 1.0 - d2 * scale
 }
 
-/// A [`RadiusSearch`] asked in batches.
-pub struct Batch<S>(S);
-/// A [`RadiusSearch`] asked one query at a time.
-pub struct Single<S>(S);
-
 /// How a [`RadiusSearch`] is built.
-pub trait Build: RadiusSearch {
-    const ONE_RADIUS: bool;
-    fn over(points: &[Vec3], radius: f32) -> Self;
-}
-
-impl Build for PointBvh {
+pub trait Build {
+    type Index: RadiusSearch;
     const ONE_RADIUS: bool = false;
-    fn over(points: &[Vec3], _: f32) -> Self {
-        Self::new(points).expect("finite points")
+    fn over(points: &[Vec3], radius: f32) -> Self::Index;
+}
+
+/// A [`PointBvh`] in Morton order.
+pub struct Morton;
+/// A [`PointBvh`] in the order of a kd-tree.
+pub struct Median;
+/// A [`HashGrid`].
+pub struct Grid;
+
+impl Build for Morton {
+    type Index = PointBvh;
+    fn over(points: &[Vec3], _: f32) -> PointBvh {
+        PointBvh::new(points).expect("finite points")
     }
 }
 
-impl Build for HashGrid {
+impl Build for Median {
+    type Index = PointBvh;
+    fn over(points: &[Vec3], _: f32) -> PointBvh {
+        PointBvh::with_order(points, PointOrder::Median).expect("finite points")
+    }
+}
+
+impl Build for Grid {
+    type Index = HashGrid;
     const ONE_RADIUS: bool = true;
-    fn over(points: &[Vec3], radius: f32) -> Self {
-        Self::new(points, radius).expect("finite points")
+    fn over(points: &[Vec3], radius: f32) -> HashGrid {
+        HashGrid::new(points, radius).expect("finite points")
     }
 }
 
-impl<S: Build> Peer<'_> for Batch<S> {
-    const ONE_RADIUS: bool = S::ONE_RADIUS;
+/// A [`RadiusSearch`] asked in batches.
+pub struct Batch<B: Build>(B::Index);
+/// A [`RadiusSearch`] asked one query at a time.
+pub struct Single<B: Build>(B::Index);
+
+impl<B: Build> Peer<'_> for Batch<B> {
+    const ONE_RADIUS: bool = B::ONE_RADIUS;
 
     fn build(points: &[Vec3], radius: f32) -> Self {
-        Self(S::over(points, radius))
+        Self(B::over(points, radius))
     }
 
     fn kernel(&self, queries: &[Vec3], radius: f32) -> Vec<Found> {
@@ -94,11 +110,11 @@ impl<S: Build> Peer<'_> for Batch<S> {
     }
 }
 
-impl<S: Build> Peer<'_> for Single<S> {
-    const ONE_RADIUS: bool = S::ONE_RADIUS;
+impl<B: Build> Peer<'_> for Single<B> {
+    const ONE_RADIUS: bool = B::ONE_RADIUS;
 
     fn build(points: &[Vec3], radius: f32) -> Self {
-        Self(S::over(points, radius))
+        Self(B::over(points, radius))
     }
 
     fn kernel(&self, queries: &[Vec3], radius: f32) -> Vec<Found> {

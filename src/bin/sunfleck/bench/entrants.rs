@@ -7,8 +7,8 @@ use glam::Vec3;
 use rayon::prelude::*;
 use sunfleck::index::stats::{Costs, CountVisits, CountedPointBvh, Weights};
 use sunfleck::index::{
-    Boxes, BruteForce, Buffers, Builder, HashGrid, KdBuffered, KdTree, Nearest, PointBvh, QueryOrder, Radii,
-    RadiusSearch, SampleBvh, SampleOptions, queries_as_boxes,
+    Boxes, BruteForce, Buffers, Builder, HashGrid, KdBuffered, KdTree, Nearest, PointBvh, PointOrder, QueryOrder,
+    Radii, RadiusSearch, SampleBvh, SampleOptions, queries_as_boxes,
 };
 
 use super::contest::{self, Anatomy, Answer, Entrant, Of, Operation, Question, Visited};
@@ -47,13 +47,20 @@ pub fn radius_search(points: &[Vec3]) -> Vec<Boxed<'_>> {
 
 /// Those of Figure 7.
 pub fn nearest(points: &[Vec3]) -> Vec<Boxed<'_>> {
-    vec![default(points), samples(METHOD, points, PLOC, true, 1), kd(points), grid("grid", points, QueryOrder::Auto)]
+    vec![
+        default(points),
+        median(points),
+        samples(METHOD, points, PLOC, true, 1),
+        kd(points),
+        grid("grid", points, QueryOrder::Auto),
+    ]
 }
 
 /// All, and every build option, for so many neighbours of so many queries.
 pub fn ablations<'a>(points: &'a [Vec3], question: &Question<'_>) -> Vec<Boxed<'a>> {
     let mut all = vec![
         default(points),
+        median(points),
         Box::new(Of::new("bvh8, one by one", |_| Ok(OneByOne(PointBvh::new(points)?)))),
         samples("bvh2-inflated, LBVH", points, Builder::Lbvh, true, 1),
         samples(METHOD, points, PLOC, true, 1),
@@ -82,6 +89,15 @@ pub fn ablations<'a>(points: &'a [Vec3], question: &Question<'_>) -> Vec<Boxed<'
 
 /// [`DEFAULT`].
 fn default(points: &[Vec3]) -> Boxed<'_> {
+    point_bvh(DEFAULT, points, PointOrder::Morton)
+}
+
+/// The default's form over points in the order of a kd-tree.
+fn median(points: &[Vec3]) -> Boxed<'_> {
+    point_bvh("bvh8, median", points, PointOrder::Median)
+}
+
+fn point_bvh<'a>(name: &'static str, points: &'a [Vec3], order: PointOrder) -> Boxed<'a> {
     let describe = |tree: &PointBvh, queries: &[Vec3], radius: f32| {
         let counted = CountedPointBvh::new(tree);
         Anatomy {
@@ -89,7 +105,7 @@ fn default(points: &[Vec3]) -> Boxed<'_> {
             costs: Some(Costs::of(tree, radius, Weights::default())),
         }
     };
-    Box::new(Of::new(DEFAULT, |_| PointBvh::new(points)).described(describe))
+    Box::new(Of::new(name, move |_| PointBvh::with_order(points, order)).described(describe))
 }
 
 /// [`RIVAL`].

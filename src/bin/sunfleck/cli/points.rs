@@ -11,6 +11,9 @@ use sunfleck::scene::settings::parse_count;
 
 use super::number;
 
+/// Of a made cloud's noise and shift, its shapes being 2 across; also degrees it is turned by.
+const MAX_LENGTH: f64 = 1e6;
+
 const EXAMPLES: &str = "\
 Read are .ply (ascii, binary), .obj (vertices) and .xyz, .txt, .asc (3 or 6 columns); written is binary .ply.
 Lengths are in the clouds' own unit, whichever that is.
@@ -124,7 +127,7 @@ pub struct MakeArgs {
     #[arg(long, value_name = "N", default_value = "100k", allow_hyphen_values = true, value_parser = cloud_size)]
     pub points: u32,
     /// Standard deviation along the scanner's ray
-    #[arg(long, value_name = "LENGTH", default_value = "0.0005", allow_hyphen_values = true, value_parser = distance)]
+    #[arg(long, value_name = "LENGTH", default_value = "0.0005", allow_hyphen_values = true, value_parser = noise)]
     pub noise: f64,
     /// Of the random numbers: another scan of the same surface
     #[arg(long, value_name = "N", default_value = "0")]
@@ -153,13 +156,20 @@ fn k(text: &str) -> Result<usize, String> {
 fn distance(text: &str) -> Result<f64, String> {
     match number::<f64>(text)? {
         x if x >= 0.0 && x.is_finite() => Ok(x),
-        _ => Err("must be 0 or more".into()),
+        _ => Err("must be 0 or more, and finite".into()),
+    }
+}
+
+fn noise(text: &str) -> Result<f64, String> {
+    match number::<f64>(text)? {
+        x if (0.0..=MAX_LENGTH).contains(&x) => Ok(x),
+        _ => Err("must be 0 to 1e6".into()),
     }
 }
 
 fn finite(text: &str) -> Result<f64, String> {
     match number::<f64>(text)? {
-        x if x.abs() <= 1e6 => Ok(x),
+        x if x.abs() <= MAX_LENGTH => Ok(x),
         _ => Err("must be between -1e6 and 1e6".into()),
     }
 }
@@ -196,8 +206,10 @@ mod tests {
             assert!(k(wrong).is_err(), "{wrong}");
         }
         for wrong in ["-1", "nan", "inf", "", "x"] {
-            assert!(distance(wrong).is_err(), "{wrong}");
+            assert!(distance(wrong).is_err() && noise(wrong).is_err(), "{wrong}");
         }
+        // Beyond what a 32-bit position holds.
+        assert!(noise("1e39").is_err() && noise("1e6") == Ok(1e6) && noise("0") == Ok(0.0));
         assert_eq!(shift("1,-2,0.5"), Ok(Shift([1.0, -2.0, 0.5])));
         for wrong in ["", "1", "1,2", "1,2,3,4", "1,2,nan"] {
             assert!(shift(wrong).is_err(), "{wrong}");
