@@ -11,6 +11,9 @@ mod render;
 mod report;
 mod scenes;
 mod stop;
+#[cfg(test)] // Until the window uses it.
+#[path = "view/camera.rs"]
+mod view_camera;
 
 use std::process::ExitCode;
 
