@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::batch::GRAIN;
 use super::stats::{CountVisits, Hierarchy, Node, Visits};
-use super::{Error, KdTree, Nearest, Neighbour, Radii, RadiusSearch};
+use super::{Error, Nearest, Neighbour, PointKd, Radii, RadiusSearch};
 
 /// Queries answered before their buffers are read and filled anew, in [`KdBuffered`]'s `fold_all`, at most.
 const BATCH: usize = 1 << 16;
@@ -58,18 +58,18 @@ impl Buffers {
     }
 }
 
-/// See the module. Single queries are those of the [`KdTree`]; `fold_all` goes through buffers, and is an error where
+/// See the module. Single queries are those of the [`PointKd`]; `fold_all` goes through buffers, and is an error where
 /// they truncate.
 #[derive(Clone, Debug, Default)]
 pub struct KdBuffered {
-    tree: KdTree,
+    tree: PointKd,
     capacity: usize,
 }
 
 impl KdBuffered {
     /// Over all of `points`, with rows for `capacity` neighbours.
     pub fn new(points: &[Vec3], capacity: usize) -> Result<Self, Error> {
-        Ok(Self { tree: KdTree::new(points)?, capacity })
+        Ok(Self { tree: PointKd::new(points)?, capacity })
     }
 
     /// Over other points, reusing the memory. After an error the tree is what it was.

@@ -11,7 +11,7 @@
 //! | any; several radii, or one a query; points that are soon others; the same tree on the GPU | [`PointBvh::new`] |
 //! | the same for points that stay and are asked much; k-NN | [`PointBvh::with_order`], [`PointOrder::Median`] |
 //! | one radius for all, asked many times; k-NN within a radius that few points are in | [`HashGrid`] |
-//! | radii far below the largest | not a grid or inflated boxes, which look as far as the largest: [`PointBvh`], [`KdTree`] |
+//! | radii far below the largest | not a grid or inflated boxes, which look as far as the largest: [`PointBvh`], [`PointKd`] |
 //! | a handful, or to check another index by | [`BruteForce`] |
 //! | to compare: FLANN's form, with result buffers | [`KdBuffered`] |
 //! | to compare: the paper's form, boxes inflated by the radius, and the same with tight boxes | [`SampleBvh`] |
@@ -24,7 +24,7 @@
 //! |---|---|---|---|
 //! | [`HashGrid`] | 7.9 runs of cells | – | 141 |
 //! | [`PointBvh`] | 41, of eight boxes | 179 | 139 |
-//! | [`KdTree`] | 46 | 71 | 157 |
+//! | [`PointKd`] | 46 | 71 | 157 |
 //! | [`SampleBvh`], LBVH, tight, one point to a leaf | 145 | 189 | 51 |
 //! | the same, inflated | 176 | 220 | 66 |
 //! | [`SampleBvh`], LBVH, tight, eight points to a leaf | 55 | 83 | 81 |
@@ -37,12 +37,12 @@ mod batch;
 mod blocks;
 mod bvh;
 mod grid;
-mod kd;
 mod kd_buffered;
 mod lanes;
 mod median;
 mod nearest;
 mod packet;
+mod point_kd;
 mod queries_as_boxes;
 mod radix;
 mod sample_boxes;
@@ -57,9 +57,9 @@ use glam::Vec3;
 pub use batch::{NearestLists, Neighbours, Radii};
 pub use bvh::{PointBvh, PointOrder};
 pub use grid::{HashGrid, QueryOrder};
-pub use kd::KdTree;
 pub use kd_buffered::{Buffers, KdBuffered};
 pub use nearest::{MAX_K, Nearest, Neighbour};
+pub use point_kd::PointKd;
 pub use queries_as_boxes::queries_as_boxes;
 pub use sample_boxes::{Boxes, Builder, SampleBvh, SampleOptions};
 

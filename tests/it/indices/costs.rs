@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use sunfleck::index::stats::{Costs, CountVisits, CountedPointBvh, Hierarchy, Node, Weights};
-use sunfleck::index::{BruteForce, HashGrid, KdTree, PointBvh, QueryOrder, RadiusSearch};
+use sunfleck::index::{BruteForce, HashGrid, PointBvh, PointKd, QueryOrder, RadiusSearch};
 
 use super::clouds::{cloud, cube};
 use super::{Boxes, LBVH, PLOC, grid, sample_bvh};
@@ -59,7 +59,7 @@ fn the_surface_area_bounds_the_volume() {
         let n = points.len();
         for radius in [1e-3, 0.05, 0.5] {
             check_bound("point BVH", &PointBvh::new(&points).unwrap(), n, radius);
-            check_bound("kd-tree", &KdTree::new(&points).unwrap(), n, radius);
+            check_bound("kd-tree", &PointKd::new(&points).unwrap(), n, radius);
             for builder in [LBVH, PLOC] {
                 let tight = check_bound("tight", &sample_bvh(&points, builder, Boxes::Tight, 1), n, radius);
                 let inflated = sample_bvh(&points, builder, Boxes::Inflated(radius), 1);
@@ -117,7 +117,7 @@ fn visits() {
         assert!(sum.found > 300 && sum.points < 200 * 500 && sum.nodes > 200, "{name}: {sum:?}");
     }
     check("grid", &grid(&points, radius, QueryOrder::Auto), &queries, radius);
-    check("kd-tree", &KdTree::new(&points).unwrap(), &queries, radius);
+    check("kd-tree", &PointKd::new(&points).unwrap(), &queries, radius);
     for builder in [LBVH, PLOC] {
         check("tight", &sample_bvh(&points, builder, Boxes::Tight, 1), &queries, radius);
         check("inflated", &sample_bvh(&points, builder, Boxes::Inflated(radius), 1), &queries, radius);

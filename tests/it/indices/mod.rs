@@ -9,7 +9,7 @@ use clouds::{PLACES, SHAPES, cloud, cube, queries, unit};
 use glam::Vec3;
 pub use sunfleck::index::Boxes;
 use sunfleck::index::{
-    BruteForce, Builder, Error, HashGrid, KdBuffered, KdTree, MAX_K, Nearest, Neighbour, Neighbours, PointBvh,
+    BruteForce, Builder, Error, HashGrid, KdBuffered, MAX_K, Nearest, Neighbour, Neighbours, PointBvh, PointKd,
     QueryOrder, Radii, RadiusSearch, SampleBvh, SampleOptions, queries_as_boxes,
 };
 
@@ -30,14 +30,14 @@ pub fn grid(points: &[Vec3], radius: f32, query_order: QueryOrder) -> HashGrid {
 macro_rules! for_every_index {
     ($points:expr, $built:expr, $check:ident $(, $more:expr)*) => {{
         use $crate::indices::{Boxes, LBVH, PLOC, grid, sample_bvh};
-        use sunfleck::index::{BruteForce, KdBuffered, KdTree, PointBvh, PointOrder, QueryOrder};
+        use sunfleck::index::{BruteForce, KdBuffered, PointKd, PointBvh, PointOrder, QueryOrder};
         let (points, built): (&[glam::Vec3], f32) = ($points, $built);
         $check("brute force", &BruteForce(points) $(, $more)*);
         $check("point BVH", &PointBvh::new(points).unwrap() $(, $more)*);
         $check("point BVH, median", &PointBvh::with_order(points, PointOrder::Median).unwrap() $(, $more)*);
         $check("grid", &grid(points, built, QueryOrder::AsGiven) $(, $more)*);
         $check("grid, queries sorted", &grid(points, built, QueryOrder::Sorted) $(, $more)*);
-        $check("kd-tree", &KdTree::new(points).unwrap() $(, $more)*);
+        $check("kd-tree", &PointKd::new(points).unwrap() $(, $more)*);
         $check("kd-tree, buffered", &KdBuffered::new(points, points.len()).unwrap() $(, $more)*);
         $check("LBVH, tight", &sample_bvh(points, LBVH, Boxes::Tight, 1) $(, $more)*);
         $check("LBVH, inflated", &sample_bvh(points, LBVH, Boxes::Inflated(built), 3) $(, $more)*);
@@ -268,7 +268,7 @@ fn what_is_refused() {
         let error = Error::NotFinite { what: "point", at: 7 };
         assert_eq!(PointBvh::new(&points).unwrap_err(), error);
         assert_eq!(HashGrid::new(&points, 0.1).unwrap_err(), error);
-        assert_eq!(KdTree::new(&points).unwrap_err(), error);
+        assert_eq!(PointKd::new(&points).unwrap_err(), error);
         assert_eq!(KdBuffered::new(&points, 9).unwrap_err(), error);
         let options = SampleOptions { builder: LBVH, boxes: Boxes::Tight, leaf_size: 1 };
         assert_eq!(SampleBvh::new(&points, options).unwrap_err(), error);
@@ -289,7 +289,7 @@ fn rebuilt() {
     let start = [Vec3::ZERO];
     let mut tree = PointBvh::default();
     let mut grid = HashGrid::default();
-    let mut kd = KdTree::default();
+    let mut kd = PointKd::default();
     let mut buffered = KdBuffered::new(&start, 5000).unwrap();
     let mut boxes = sample_bvh(&start, LBVH, Boxes::Tight, 1);
     for (round, n) in (0..).zip([1000, 3, 0, 64, 65, 5000, 1, 511, 4097, 8]) {
@@ -366,7 +366,7 @@ fn threads_do_not_change_the_answers() {
         pool.install(|| {
             [
                 in_order(&grid(&points, 0.2, QueryOrder::Sorted), &queries),
-                in_order(&KdTree::new(&points).unwrap(), &queries),
+                in_order(&PointKd::new(&points).unwrap(), &queries),
                 in_order(&sample_bvh(&points, LBVH, Boxes::Tight, 2), &queries),
                 in_order(&sample_bvh(&points, PLOC, Boxes::Inflated(0.2), 1), &queries),
             ]

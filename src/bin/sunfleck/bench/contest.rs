@@ -4,7 +4,7 @@ use anyhow::{Result, bail, ensure};
 use glam::Vec3;
 use rayon::prelude::*;
 use sunfleck::index::stats::{Costs, Visits};
-use sunfleck::index::{self, BruteForce, KdTree, PointBvh, Radii, RadiusSearch};
+use sunfleck::index::{self, BruteForce, PointBvh, PointKd, Radii, RadiusSearch};
 
 use super::measure::{Time, Times, timed};
 
@@ -41,9 +41,9 @@ pub struct Question<'a> {
 }
 
 impl<'a> Question<'a> {
-    /// Finds the right answer with [`KdTree`], the counts of some queries checked by brute force.
+    /// Finds the right answer with [`PointKd`], the counts of some queries checked by brute force.
     pub fn new(points: &[Vec3], queries: &'a [Vec3], radius: f32, operation: Operation) -> Result<Self> {
-        let counts = KdTree::new(points)?.count_all(queries, Radii::One(radius))?;
+        let counts = PointKd::new(points)?.count_all(queries, Radii::One(radius))?;
         let step = (queries.len() / VERIFIED).max(1);
         let oracle = BruteForce(points);
         let wrong = (0..queries.len())

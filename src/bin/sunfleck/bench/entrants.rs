@@ -7,7 +7,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 use sunfleck::index::stats::{Costs, CountVisits, CountedPointBvh, Weights};
 use sunfleck::index::{
-    Boxes, BruteForce, Buffers, Builder, HashGrid, KdBuffered, KdTree, Nearest, PointBvh, PointOrder, QueryOrder,
+    Boxes, BruteForce, Buffers, Builder, HashGrid, KdBuffered, Nearest, PointBvh, PointKd, PointOrder, QueryOrder,
     Radii, RadiusSearch, SampleBvh, SampleOptions, queries_as_boxes,
 };
 
@@ -74,7 +74,7 @@ pub fn ablations<'a>(points: &'a [Vec3], question: &Question<'_>) -> Vec<Boxed<'
     // Sorting and buffers are forms of the sum: their k-NN is that of the index alone.
     if question.operation == Operation::Sum {
         all.push(sorted_samples("bvh2-tight, leaves of 8, sorted", points));
-        all.push(Box::new(Of::new("kd, sorted", |_| Ok(Sorted(KdTree::new(points)?)))));
+        all.push(Box::new(Of::new("kd, sorted", |_| Ok(Sorted(PointKd::new(points)?)))));
         all.push(rival(points));
         all.push(grid("grid, sorted", points, QueryOrder::Sorted));
     }
@@ -115,11 +115,11 @@ fn rival(points: &[Vec3]) -> Boxed<'_> {
 
 /// [`KD`].
 fn kd(points: &[Vec3]) -> Boxed<'_> {
-    let describe = |tree: &KdTree, queries: &[Vec3], radius: f32| Anatomy {
+    let describe = |tree: &PointKd, queries: &[Vec3], radius: f32| Anatomy {
         costs: Some(Costs::of(tree, radius, Weights::default())),
         ..visits(tree, queries, radius)
     };
-    Box::new(Of::new(KD, |_| KdTree::new(points)).described(describe))
+    Box::new(Of::new(KD, |_| PointKd::new(points)).described(describe))
 }
 
 fn grid<'a>(name: &'static str, points: &'a [Vec3], query_order: QueryOrder) -> Boxed<'a> {

@@ -31,7 +31,7 @@ struct Split {
 
 /// See the module.
 #[derive(Clone, Debug, Default)]
-pub struct KdTree {
+pub struct PointKd {
     bounds: (Vec3, Vec3),
     /// At b, the split of the range whose second half begins with block b.
     splits: Vec<Split>,
@@ -39,7 +39,7 @@ pub struct KdTree {
     sorted: Vec<Numbered>,
 }
 
-impl KdTree {
+impl PointKd {
     /// Over all of `points`.
     pub fn new(points: &[Vec3]) -> Result<Self, Error> {
         let mut tree = Self::default();
@@ -103,7 +103,7 @@ fn split(points: &mut [Numbered], splits: &mut [Split]) {
     both(first.len(), || split(first, first_splits), || split(second, second_splits));
 }
 
-impl Walk for KdTree {
+impl Walk for PointKd {
     /// The nearer half first; `bound` of the state may shrink as `visit` changes it.
     #[inline(always)]
     fn walk<L: Lanes, S, B>(
@@ -164,7 +164,7 @@ impl Walk for KdTree {
     }
 }
 
-impl RadiusSearch for KdTree {
+impl RadiusSearch for PointKd {
     fn len(&self) -> usize {
         self.blocks.len()
     }
@@ -184,13 +184,13 @@ impl RadiusSearch for KdTree {
     }
 }
 
-impl CountVisits for KdTree {
+impl CountVisits for PointKd {
     fn visits(&self, centre: Vec3, radius: f32) -> Visits {
         blocks::visits(self, centre, radius)
     }
 }
 
-impl Hierarchy for KdTree {
+impl Hierarchy for PointKd {
     fn for_each_node(&self, mut visit: impl FnMut(Node)) {
         if !self.is_empty() {
             self.for_each_below(0..self.splits.len(), &mut visit);
