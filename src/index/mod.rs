@@ -37,6 +37,7 @@ mod batch;
 mod blocks;
 mod bvh;
 mod grid;
+pub mod kd;
 mod kd_buffered;
 mod lanes;
 mod median;

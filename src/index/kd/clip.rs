@@ -1,0 +1,141 @@
+//! Boxes, and the box of what a cell leaves of a triangle (Sutherland & Hodgman 1974).
+//!
+//! What is built over are corners in single precision; clipping is in double precision, against a cell wider by
+//! [`SLACK`], and what rounding may take away is given back: a triangle that has a point in a cell is never dropped from
+//! it, and the box holds all its points there. A coordinate that all corners share stays exactly that, so that planar
+//! triangles stay planar.
+
+/// An axis-aligned box, in the frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    pub min: [f32; 3],
+    pub max: [f32; 3],
+}
+
+/// How far outside a cell clipping goes.
+const SLACK: f64 = 1.0 / (1u64 << 40) as f64;
+/// Above the error of a point cut by six planes.
+const PAD: f64 = 1.0 / (1u64 << 45) as f64;
+/// Corners of a triangle cut by six planes, and room for some that rounding adds.
+const MOST: usize = 12;
+
+impl Aabb {
+    pub const NOTHING: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
+
+    pub fn with(mut self, p: [f32; 3]) -> Self {
+        for axis in 0..3 {
+            self.min[axis] = self.min[axis].min(p[axis]);
+            self.max[axis] = self.max[axis].max(p[axis]);
+        }
+        self
+    }
+
+    /// The parts below and above a plane.
+    pub fn cut(self, axis: usize, at: f32) -> [Self; 2] {
+        let (mut below, mut above) = (self, self);
+        below.max[axis] = at;
+        above.min[axis] = at;
+        [below, above]
+    }
+
+    /// Half the surface.
+    pub fn area(&self) -> f64 {
+        let [x, y, z] = std::array::from_fn(|axis| f64::from(self.max[axis]) - f64::from(self.min[axis]));
+        x * y + y * z + z * x
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Corner {
+    at: [f64; 3],
+    /// Computed, not given.
+    cut: bool,
+}
+
+const NONE: Corner = Corner { at: [0.0; 3], cut: false };
+
+/// The box of the triangle's part in the cell; nothing if there is none.
+pub fn clip(triangle: &[[f32; 3]; 3], cell: &Aabb) -> Option<Aabb> {
+    let whole = triangle.iter().fold(Aabb::NOTHING, |b, &p| b.with(p));
+    let (mut polygon, mut other) = ([NONE; MOST], [NONE; MOST]);
+    let mut n = 3;
+    for (corner, p) in polygon.iter_mut().zip(triangle) {
+        corner.at = p.map(f64::from);
+    }
+    for axis in 0..3 {
+        for (plane, sign, needed) in [
+            (f64::from(cell.min[axis]) - SLACK, 1.0, whole.min[axis] < cell.min[axis]),
+            (f64::from(cell.max[axis]) + SLACK, -1.0, whole.max[axis] > cell.max[axis]),
+        ] {
+            if needed {
+                match cut(&polygon[..n], &mut other, axis, plane, sign) {
+                    Some(0) => return None,
+                    Some(left) => n = left,
+                    None => return within(&whole, cell, whole),
+                }
+                std::mem::swap(&mut polygon, &mut other);
+            }
+        }
+    }
+    let mut left = Aabb::NOTHING;
+    for corner in &polygon[..n] {
+        for (axis, &x) in corner.at.iter().enumerate() {
+            let pad = if corner.cut { PAD } else { 0.0 };
+            left.min[axis] = left.min[axis].min(down(x - pad));
+            left.max[axis] = left.max[axis].max(up(x + pad));
+        }
+    }
+    within(&whole, cell, left)
+}
+
+/// The box `left`, cut to the cell and to the whole triangle's box.
+fn within(whole: &Aabb, cell: &Aabb, mut left: Aabb) -> Option<Aabb> {
+    for axis in 0..3 {
+        let (min, max) = (whole.min[axis].max(cell.min[axis]), whole.max[axis].min(cell.max[axis]));
+        if min > max {
+            return None;
+        }
+        // + 0: never −0.
+        left.min[axis] = left.min[axis].clamp(min, max) + 0.0;
+        left.max[axis] = left.max[axis].clamp(min, max) + 0.0;
+    }
+    Some(left)
+}
+
+/// Keeps what is on the side of the plane that `sign` points to; number of corners, none if they are too many.
+fn cut(polygon: &[Corner], into: &mut [Corner; MOST], axis: usize, plane: f64, sign: f64) -> Option<usize> {
+    let mut n = 0;
+    let mut keep = |corner| {
+        // A convex polygon gains one corner a plane; rounding may make it slightly concave, and then it may gain more.
+        *into.get_mut(n)? = corner;
+        n += 1;
+        Some(())
+    };
+    let outside = |corner: &Corner| (corner.at[axis] - plane) * sign < 0.0;
+    for (i, from) in polygon.iter().enumerate() {
+        let to = &polygon[(i + 1) % polygon.len()];
+        if !outside(from) {
+            keep(*from)?;
+        }
+        if outside(from) != outside(to) {
+            let part = (plane - from.at[axis]) / (to.at[axis] - from.at[axis]);
+            let mut at = std::array::from_fn(|axis| {
+                let (a, b) = (from.at[axis], to.at[axis]);
+                (a + part * (b - a)).clamp(a.min(b), a.max(b))
+            });
+            at[axis] = plane;
+            keep(Corner { at, cut: true })?;
+        }
+    }
+    Some(n)
+}
+
+fn down(x: f64) -> f32 {
+    let rounded = x as f32;
+    if f64::from(rounded) > x { rounded.next_down() } else { rounded }
+}
+
+fn up(x: f64) -> f32 {
+    let rounded = x as f32;
+    if f64::from(rounded) < x { rounded.next_up() } else { rounded }
+}

@@ -1,0 +1,165 @@
+//! Sorted events: where triangles begin and end along the axes (Wald & Havran 2006).
+//!
+//! Sorted anew in each node that is O(N log² N). Sorted once it is O(N log N): a split keeps the events of triangles that
+//! are on one side, which leaves them in order; only those of triangles that the plane cuts are made anew, sorted, and
+//! merged in. They are few: O(√N) of N.
+
+use super::cell::{ABOVE, CUT, Halves, Part};
+use super::sah::{Cheapest, Counts};
+
+/// One word, in the order of the sweep: 32 bits of place, 2 of kind, 30 of the triangle's index in its cell.
+type Event = u64;
+
+/// Kinds, in the order they are counted in at one place.
+const END: u64 = 0;
+const PLANAR: u64 = 1;
+const START: u64 = 2;
+const INDEX_BITS: u32 = 30;
+const INDEX: u64 = (1 << INDEX_BITS) - 1;
+
+/// The events of a cell: one sorted list, axis by axis.
+#[derive(Debug)]
+pub struct Events([Vec<Event>; 3]);
+
+/// The bits of a number, so that their order is that of the numbers. Zero has one form only.
+#[inline]
+fn key(x: f32) -> u32 {
+    let bits = x.to_bits();
+    if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
+}
+
+#[inline]
+fn place(event: Event) -> f32 {
+    let key = (event >> 32) as u32;
+    f32::from_bits(if key >> 31 == 1 { key & !(1 << 31) } else { !key })
+}
+
+#[inline]
+fn kind(event: Event) -> u64 {
+    event >> INDEX_BITS & 3
+}
+
+#[inline]
+fn event(at: f32, kind: u64, index: u64) -> Event {
+    u64::from(key(at)) << 32 | kind << INDEX_BITS | index
+}
+
+/// The events of one triangle along one axis.
+#[inline]
+fn push(part: &Part, index: u64, axis: usize, into: &mut Vec<Event>) {
+    let (min, max) = (part.bounds.min[axis], part.bounds.max[axis]);
+    if min == max {
+        into.push(event(min, PLANAR, index));
+    } else {
+        into.push(event(min, START, index));
+        into.push(event(max, END, index));
+    }
+}
+
+impl Events {
+    /// Of all triangles of a cell.
+    pub fn of(parts: &[Part]) -> Self {
+        Self(std::array::from_fn(|axis| {
+            let mut events = Vec::with_capacity(2 * parts.len());
+            for (part, index) in parts.iter().zip(0..) {
+                push(part, index, axis, &mut events);
+            }
+            events.sort_unstable();
+            events
+        }))
+    }
+
+    /// Every place where something begins or ends, with the counts there. `n` triangles are in the cell.
+    pub fn offer(&self, n: usize, cheapest: &mut Cheapest<'_>) {
+        for (axis, events) in self.0.iter().enumerate() {
+            let (mut below, mut above) = (0, n);
+            let mut rest = events.as_slice();
+            while let Some(&first) = rest.first() {
+                let mut counts = [0; 3];
+                let here = rest.iter().take_while(|&&e| e >> 32 == first >> 32).count();
+                for &e in &rest[..here] {
+                    counts[kind(e) as usize] += 1;
+                }
+                rest = &rest[here..];
+                let [ending, planar, starting] = counts;
+                above -= ending + planar;
+                cheapest.offer(axis, place(first), Counts { below, planar, above });
+                below += starting + planar;
+            }
+        }
+    }
+
+    /// The events of both halves.
+    pub fn divide(self, halves: &Halves) -> [Self; 2] {
+        let mut divided = [Self(Default::default()), Self(Default::default())];
+        for (axis, events) in self.0.into_iter().enumerate() {
+            let mut lists = [&halves.parts[0], &halves.parts[1]].map(|parts| Vec::with_capacity(2 * parts.len()));
+            for &e in &events {
+                let place = halves.places[(e & INDEX) as usize];
+                if place != CUT {
+                    lists[usize::from(place & ABOVE != 0)].push(e & !INDEX | u64::from(place & !ABOVE));
+                }
+            }
+            for (half, mut list) in lists.into_iter().enumerate() {
+                let mut new = Vec::with_capacity(2 * halves.cut[half].len());
+                for &index in &halves.cut[half] {
+                    push(&halves.parts[half][index as usize], u64::from(index), axis, &mut new);
+                }
+                new.sort_unstable();
+                merge(&mut list, &new);
+                divided[half].0[axis] = list;
+            }
+        }
+        divided
+    }
+}
+
+/// Merges one sorted list into another, from behind.
+fn merge(list: &mut Vec<Event>, new: &[Event]) {
+    let (mut a, mut b) = (list.len(), new.len());
+    list.resize(a + b, 0);
+    for to in (0..a + b).rev() {
+        if b == 0 {
+            break;
+        }
+        if a > 0 && list[a - 1] > new[b - 1] {
+            a -= 1;
+            list[to] = list[a];
+        } else {
+            b -= 1;
+            list[to] = new[b];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_in_the_order_of_places_then_kinds_and_keep_both() {
+        let places = [-1.0, -1e-30, 0.0, f32::MIN_POSITIVE, 0.3, 1.0f32];
+        let mut last = None;
+        for at in places {
+            for k in [END, PLANAR, START] {
+                let e = event(at, k, 5);
+                assert!((place(e), kind(e), e & INDEX) == (at, k, 5));
+                assert!(last < Some(e));
+                last = Some(e);
+            }
+        }
+    }
+
+    #[test]
+    fn merging_is_sorting() {
+        for (a, b) in
+            [(vec![], vec![]), (vec![3, 5], vec![]), (vec![], vec![1]), (vec![2, 4, 9], vec![1, 4, 5, 10, 11])]
+        {
+            let mut merged = a.clone();
+            merge(&mut merged, &b);
+            let mut sorted = [a, b].concat();
+            sorted.sort_unstable();
+            assert_eq!(merged, sorted);
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! The tree as it is kept: eight bytes a node, no pointers.
+//!
+//! Nodes are in the order of a walk that goes below first: the child below stands behind its parent, and the parent says
+//! where the one above is. A parallel build makes parts of that order and joins them, so it gives the same tree.
+
+use super::cell::{Cell, Node, Task};
+use super::walk::{Nodes, Opened};
+
+/// Cells of so many triangles are built beside each other.
+const PARALLEL: usize = 4096;
+const LEAF: u32 = 3;
+
+/// An inner node has the plane's place and, above two bits of axis, the child above. A leaf has its first item and, above
+/// two bits that are 3, how many.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Packed {
+    at: u32,
+    link: u32,
+}
+
+const _: () = assert!(size_of::<Packed>() == 8);
+
+/// See the module.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Tree {
+    nodes: Vec<Packed>,
+    /// Triangles of the leaves.
+    items: Vec<u32>,
+}
+
+impl Tree {
+    /// Of all that is below a cell.
+    pub fn build(cell: Cell, task: &Task, parallel: bool) -> Self {
+        let mut tree = Self::default();
+        tree.push(cell, task, parallel);
+        tree.nodes.shrink_to_fit();
+        tree.items.shrink_to_fit();
+        tree
+    }
+
+    fn push(&mut self, cell: Cell, task: &Task, parallel: bool) {
+        match cell.open(task) {
+            Node::Leaf(faces) => self.push_leaf(&faces),
+            Node::Inner { axis, at, children: [below, above] } => {
+                let node = self.push_inner(axis, at);
+                if parallel && below.len() + above.len() >= PARALLEL {
+                    let mut other = Self::default();
+                    rayon::join(|| self.push(below, task, true), || other.push(above, task, true));
+                    self.set_above(node);
+                    self.append(&other);
+                } else {
+                    self.push(below, task, false);
+                    self.set_above(node);
+                    self.push(above, task, false);
+                }
+            }
+        }
+    }
+
+    pub(super) fn push_leaf(&mut self, faces: &[u32]) {
+        self.nodes.push(Packed { at: self.items.len() as u32, link: (faces.len() as u32) << 2 | LEAF });
+        self.items.extend_from_slice(faces);
+    }
+
+    /// Its index, for [`Tree::set_above`].
+    pub(super) fn push_inner(&mut self, axis: usize, at: f32) -> usize {
+        self.nodes.push(Packed { at: at.to_bits(), link: axis as u32 });
+        self.nodes.len() - 1
+    }
+
+    /// The next node is the child above of this one.
+    pub(super) fn set_above(&mut self, node: usize) {
+        let next = self.nodes.len() as u32;
+        self.nodes[node].link |= next << 2;
+    }
+
+    fn append(&mut self, other: &Self) {
+        let (nodes, items) = (self.nodes.len() as u32, self.items.len() as u32);
+        self.nodes.extend(other.nodes.iter().map(|&Packed { at, link }| match link & 3 {
+            LEAF => Packed { at: at + items, link },
+            _ => Packed { at, link: link + (nodes << 2) },
+        }));
+        self.items.extend_from_slice(&other.items);
+    }
+
+    /// Whether indices fit into a node.
+    pub(super) fn fits(&self) -> bool {
+        self.nodes.len() < 1 << 30 && u32::try_from(self.items.len()).is_ok()
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        self.nodes.len() * size_of::<Packed>() + self.items.len() * size_of::<u32>()
+    }
+}
+
+impl<'a> Nodes for &'a Tree {
+    type Id = u32;
+    type Items = &'a [u32];
+
+    #[inline]
+    fn root(self) -> u32 {
+        0
+    }
+
+    #[inline]
+    fn open(self, node: u32) -> Opened<u32, &'a [u32]> {
+        let Packed { at, link } = self.nodes[node as usize];
+        let (axis, rest) = (link & 3, link >> 2);
+        if axis == LEAF {
+            Opened::Leaf(&self.items[at as usize..][..rest as usize])
+        } else {
+            Opened::Inner { axis: axis as usize, at: f32::from_bits(at), below: node + 1, above: rest }
+        }
+    }
+}
