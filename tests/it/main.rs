@@ -16,6 +16,7 @@ mod index;
 mod indices;
 #[cfg(feature = "render")]
 mod inspect;
+mod kd;
 mod layering;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod layout;

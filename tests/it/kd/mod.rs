@@ -1,0 +1,6 @@
+//! kd-trees over triangles.
+
+mod meshes;
+mod queries;
+mod trees;
+mod watertight;
