@@ -1,4 +1,5 @@
-//! Neighbour search over points: radius search and truncated k-NN. Usable alone: nothing here knows of photons.
+//! Neighbour search over points: radius search and truncated k-NN; and rays among triangles ([`kd`]). Usable alone: nothing
+//! here knows of photons.
 //!
 //! Everything is in the caller's unit. A point is within a radius when |p − q|² ≤ r², the squares taken in `f32` as
 //! x² + y² + z² from left to right, so that every index finds the same set, bit for bit. A distance whose square
@@ -13,6 +14,7 @@
 //! | one radius for all, asked many times; k-NN within a radius that few points are in | [`HashGrid`] |
 //! | radii far below the largest | not a grid or inflated boxes, which look as far as the largest: [`PointBvh`], [`PointKd`] |
 //! | a handful, or to check another index by | [`BruteForce`] |
+//! | triangles and rays, not points | [`kd`] |
 //! | to compare: FLANN's form, with result buffers | [`KdBuffered`] |
 //! | to compare: the paper's form, boxes inflated by the radius, and the same with tight boxes | [`SampleBvh`] |
 //! | to compare: what the paper rejects | [`queries_as_boxes`] |
