@@ -139,3 +139,57 @@ fn up(x: f64) -> f32 {
     let rounded = x as f32;
     if f64::from(rounded) < x { rounded.next_up() } else { rounded }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::rng::pcg4d;
+
+    /// Single-precision points on edges, which clipping can only round, and cells that end there.
+    #[test]
+    fn a_point_of_a_triangle_in_a_cell_is_in_its_box() {
+        let mut cut = 0;
+        for seed in 0..20_000 {
+            let mut drawn = 0;
+            let mut below = |n: u32| {
+                drawn += 1;
+                pcg4d([seed, drawn, 3, 1])[0] % n
+            };
+            let mut place = |n: u32| [(); 3].map(|()| below(n) as f32 / 512.0);
+            let (a, d, c) = (place(512), place(64), place(512));
+            let b = std::array::from_fn(|i| a[i] + 7.0 * d[i]);
+            let k = (1 + below(6)) as f32;
+            let on_edge: [f32; 3] = std::array::from_fn(|i| a[i] + k * d[i]);
+            let mut cell = Aabb { min: on_edge, max: on_edge };
+            for axis in 0..3 {
+                let size = 0.1 * (1 + below(5)) as f32;
+                if below(2) == 0 {
+                    cell.min[axis] -= size;
+                } else {
+                    cell.max[axis] += size;
+                }
+            }
+            let left = clip(&[a, b, c], &cell).expect("it has a point there");
+            for axis in 0..3 {
+                assert!(left.min[axis] <= on_edge[axis] && on_edge[axis] <= left.max[axis], "seed {seed}");
+                assert!(left.min[axis] >= cell.min[axis] && left.max[axis] <= cell.max[axis], "seed {seed}");
+            }
+            cut += usize::from(left.max != cell.max && left.min != cell.min);
+        }
+        assert!(cut > 1000, "only {cut} were cut");
+    }
+
+    #[test]
+    fn the_box_is_that_of_the_part() {
+        let cell = Aabb { min: [0.0; 3], max: [1.0; 3] };
+        // A corner of the triangle is cut off at x = 0, half way.
+        let left = clip(&[[-0.5, 0.25, 0.5], [0.5, 0.25, 0.5], [0.5, 0.75, 0.5]], &cell).unwrap();
+        assert!((left.min[0], left.max[0], left.min[1], left.min[2], left.max[2]) == (0.0, 0.5, 0.25, 0.5, 0.5));
+        assert_eq!(left.max[1], 0.75);
+        let left = clip(&[[-0.5, 0.25, 0.5], [0.5, 0.25, 0.5], [-0.5, 0.75, 0.5]], &cell).unwrap();
+        assert!((left.max[1] - 0.5).abs() < 1e-6 && left.max[0] == 0.5);
+        // Its box meets the cell, the triangle does not.
+        assert_eq!(clip(&[[-0.9, 0.5, 0.5], [0.5, 1.9, 0.5], [-0.9, 1.9, 0.5]], &cell), None);
+        assert_eq!(clip(&[[2.0, 0.5, 0.5], [3.0, 1.0, 0.5], [3.0, 0.0, 0.5]], &cell), None);
+    }
+}

@@ -52,7 +52,7 @@ fn nothing_is_missing<T: Scalar>(tree: &KdTree<T>, r: &mut Random, n: usize, wha
 #[test]
 fn builders_give_one_tree_and_miss_nothing() {
     let mut inner = 0;
-    for seed in 0..40 {
+    for seed in 0..16 {
         for kind in 0..N_KINDS {
             let (soup, name) = random(kind, seed, 60);
             let what = format!("{name}, seed {seed}");
@@ -70,7 +70,7 @@ fn builders_give_one_tree_and_miss_nothing() {
             inner += double.nodes().filter(|n| matches!(n, NodeView::Inner { .. })).count();
         }
     }
-    assert!(inner > 5000, "only {inner} planes were compared");
+    assert!(inner > 2000, "only {inner} planes were compared");
 }
 
 #[test]
@@ -141,22 +141,31 @@ fn the_root_is_split_where_it_is_cheapest() {
 }
 
 #[test]
-fn triangles_in_a_plane_are_on_one_side_of_it() {
-    // A wall of many triangles between two sparse halves.
-    let mut soup: Soup = (Vec::new(), Vec::new());
-    let mut r = Random::new(3);
-    for i in 0..40 {
-        let x = if i < 36 { 0.3 } else { [-1.0, -0.9, 1.0, 0.95][i - 36] };
-        let bend = if i < 36 { 0.0 } else { 0.01 };
-        let n = soup.0.len() as u32;
-        soup.0.extend((0..3).map(|k| [x + bend * f64::from(k), r.signed(), r.signed()]));
-        soup.1.push([n, n + 1, n + 2]);
+fn triangles_in_a_plane_go_to_the_side_where_they_cost_less() {
+    // A wall of many triangles between two sparse halves, of which one is smaller: whichever axis, whichever way.
+    for axis in 0..3 {
+        for side in [-1.0, 1.0] {
+            let mut soup: Soup = (Vec::new(), Vec::new());
+            let mut r = Random::new(3);
+            for i in 0..40 {
+                let (at, bend) = if i < 36 { (0.3, 0.0) } else { ([-1.0, -0.9, 1.0, 0.95][i - 36], 0.01) };
+                let n = soup.0.len() as u32;
+                for k in 0..3 {
+                    let mut p = [r.signed(), r.signed(), r.signed()];
+                    p[axis] = side * (at + bend * f64::from(k));
+                    soup.0.push(p);
+                }
+                soup.1.push([n, n + 1, n + 2]);
+            }
+            let tree = one_tree::<f64>(&soup, Sah { max_depth: 1, ..Sah::default() }, "wall");
+            let nodes: Vec<_> = tree.nodes().collect();
+            let [NodeView::Inner { axis: split, at }, NodeView::Leaf(below), NodeView::Leaf(above)] = nodes[..] else {
+                panic!("{nodes:?}");
+            };
+            assert!(split == axis && (at - side * 0.3).abs() < 1e-7, "axis {axis}, side {side}: {split}, {at}");
+            assert_eq!((below.len(), above.len()), if side > 0.0 { (2, 38) } else { (38, 2) });
+        }
     }
-    let tree = one_tree::<f64>(&soup, Sah { max_depth: 2, ..Sah::default() }, "wall");
-    let planes =
-        tree.nodes().filter(|n| matches!(n, NodeView::Inner { axis: 0, at } if (at - 0.3).abs() < 1e-7)).count();
-    let listed: usize = tree.nodes().map(|n| if let NodeView::Leaf(faces) = n { faces.len() } else { 0 }).sum();
-    assert!(planes > 0 && listed == 40, "{planes} planes, {listed} listed: {:?}", tree.nodes().collect::<Vec<_>>());
 }
 
 #[test]
