@@ -132,7 +132,7 @@ impl Cell {
 /// Who is where. Triangles that the plane cuts are clipped again, to both halves; the others keep their boxes.
 fn divide(parts: Vec<Part>, plane: &Plane, cells: &[Aabb; 2], corners: &[[[f32; 3]; 3]]) -> Halves {
     let mut halves = Halves {
-        parts: [Vec::new(), Vec::new()],
+        parts: [(); 2].map(|()| Vec::with_capacity(parts.len())),
         places: Vec::with_capacity(parts.len()),
         cut: [Vec::new(), Vec::new()],
     };

@@ -37,12 +37,6 @@ impl Aabb {
         above.min[axis] = at;
         [below, above]
     }
-
-    /// Half the surface.
-    pub fn area(&self) -> f64 {
-        let [x, y, z] = std::array::from_fn(|axis| f64::from(self.max[axis]) - f64::from(self.min[axis]));
-        x * y + y * z + z * x
-    }
 }
 
 #[derive(Clone, Copy)]

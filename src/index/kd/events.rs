@@ -73,15 +73,17 @@ impl Events {
     pub fn offer(&self, n: usize, cheapest: &mut Cheapest<'_>) {
         for (axis, events) in self.0.iter().enumerate() {
             let (mut below, mut above) = (0, n);
-            let mut rest = events.as_slice();
-            while let Some(&first) = rest.first() {
-                let mut counts = [0; 3];
-                let here = rest.iter().take_while(|&&e| e >> 32 == first >> 32).count();
-                for &e in &rest[..here] {
-                    counts[kind(e) as usize] += 1;
+            let mut events = events.iter().copied().peekable();
+            while let Some(first) = events.next() {
+                let at = first >> 32;
+                let (mut ending, mut planar, mut starting) = (0, 0, 0);
+                let mut next = Some(first);
+                while let Some(e) = next {
+                    ending += usize::from(kind(e) == END);
+                    planar += usize::from(kind(e) == PLANAR);
+                    starting += usize::from(kind(e) == START);
+                    next = events.next_if(|e| e >> 32 == at);
                 }
-                rest = &rest[here..];
-                let [ending, planar, starting] = counts;
                 above -= ending + planar;
                 cheapest.offer(axis, place(first), Counts { below, planar, above });
                 below += starting + planar;

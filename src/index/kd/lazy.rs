@@ -27,19 +27,19 @@ struct Growing {
 /// A node that may not be there yet.
 #[derive(Debug)]
 struct Seed {
-    cell: Mutex<Option<Cell>>,
+    cell: Mutex<Option<Box<Cell>>>,
     node: OnceLock<Grown>,
 }
 
 #[derive(Debug)]
 enum Grown {
     Inner { axis: usize, at: f32, children: Box<[Seed; 2]> },
-    Leaf(Vec<u32>),
+    Leaf(Box<[u32]>),
 }
 
 impl Seed {
     fn new(cell: Cell) -> Self {
-        Self { cell: Mutex::new(Some(cell)), node: OnceLock::new() }
+        Self { cell: Mutex::new(Some(Box::new(cell))), node: OnceLock::new() }
     }
 
     /// Opening takes no part in rayon's pool: a thread that waits here must not be given other work that waits here too.
@@ -50,7 +50,7 @@ impl Seed {
                 Some(Node::Inner { axis, at, children }) => {
                     Grown::Inner { axis, at, children: Box::new(children.map(Seed::new)) }
                 }
-                Some(Node::Leaf(faces)) => Grown::Leaf(faces),
+                Some(Node::Leaf(faces)) => Grown::Leaf(faces.into_boxed_slice()),
                 // Taken once, inside of what runs once.
                 None => unreachable!("a cell is opened once"),
             }

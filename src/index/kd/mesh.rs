@@ -18,6 +18,8 @@ pub struct Triangles<T> {
 pub(super) struct Frame {
     pub(super) centre: [f64; 3],
     pub(super) scale: f64,
+    /// Half the size of the box along each axis, in the frame.
+    pub(super) half: [f64; 3],
 }
 
 impl Frame {
@@ -55,11 +57,11 @@ impl<T: Scalar> Triangles<T> {
                 }
             }
         }
-        let mut frame = Frame { centre: [0.0; 3], scale: 1.0 };
+        let mut frame = Frame { centre: [0.0; 3], scale: 1.0, half: [0.0; 3] };
         if !faces.is_empty() {
             frame.centre = std::array::from_fn(|axis| min[axis] + (max[axis] - min[axis]) * 0.5);
-            let half = (0..3).map(|axis| (frame.centre[axis] - min[axis]).max(max[axis] - frame.centre[axis]));
-            let half = half.fold(0.0, f64::max);
+            frame.half = [0, 1, 2].map(|axis| (frame.centre[axis] - min[axis]).max(max[axis] - frame.centre[axis]));
+            let half = frame.half.iter().fold(0.0, |a: f64, &b| a.max(b));
             if half > 0.0 {
                 if half < 1.0 / limit {
                     return Err(Error::TooSmall(half));
@@ -67,6 +69,7 @@ impl<T: Scalar> Triangles<T> {
                 // 2^e ≤ half < 2^(e + 1)
                 let e = ((half.to_bits() >> 52) & 0x7ff) as i32 - 1023;
                 frame.scale = 2.0f64.powi(-(e + 1));
+                frame.half = frame.half.map(|x| x * frame.scale);
             }
         }
         Ok(Self { vertices, faces, frame })

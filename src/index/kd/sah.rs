@@ -57,28 +57,40 @@ pub struct Counts {
 pub struct Cheapest<'a> {
     sah: &'a Sah,
     cell: &'a Aabb,
-    area: f64,
+    /// Of the cell's faces across each axis, and half their edges.
+    faces: [f64; 3],
+    rims: [f64; 3],
+    /// κ_I over the cell's area.
+    weight: f64,
     best: Option<(f64, Plane)>,
 }
 
 impl<'a> Cheapest<'a> {
     pub fn new(sah: &'a Sah, cell: &'a Aabb) -> Self {
-        Self { sah, cell, area: cell.area(), best: None }
+        let size: [f64; 3] = std::array::from_fn(|axis| f64::from(cell.max[axis]) - f64::from(cell.min[axis]));
+        let others = |axis: usize| (size[(axis + 1) % 3], size[(axis + 2) % 3]);
+        let faces = [0, 1, 2].map(|axis| others(axis).0 * others(axis).1);
+        let rims = [0, 1, 2].map(|axis| others(axis).0 + others(axis).1);
+        // Of a cell without area, which no ray meets, no cost is a number below that of a leaf.
+        let weight = sah.intersection / (faces[0] + faces[1] + faces[2]);
+        Self { sah, cell, faces, rims, weight, best: None }
     }
 
     /// Both ways with the planar triangles. A plane on a face of the cell would split nothing.
     #[inline]
     pub fn offer(&mut self, axis: usize, at: f32, counts: Counts) {
-        if !(at > self.cell.min[axis] && at < self.cell.max[axis]) || self.area <= 0.0 {
+        let (min, max) = (self.cell.min[axis], self.cell.max[axis]);
+        if !(at > min && at < max) {
             return;
         }
         let Counts { below, planar, above } = counts;
-        let [area_below, area_above] = self.cell.cut(axis, at).map(|part| part.area());
-        let (sah, area) = (self.sah, self.area);
-        let bonus = if below == 0 || above == 0 { sah.empty } else { 1.0 };
+        let (face, rim, at64) = (self.faces[axis], self.rims[axis], f64::from(at));
+        let area_below = face + rim * (at64 - f64::from(min));
+        let area_above = face + rim * (f64::from(max) - at64);
+        let bonus = if below == 0 || above == 0 { self.sah.empty } else { 1.0 };
+        let (traversal, weight) = (self.sah.traversal, self.weight);
         let cost = |below: usize, above: usize| {
-            let tests = (area_below * below as f64 + area_above * above as f64) / area;
-            bonus * (sah.traversal + sah.intersection * tests)
+            bonus * (traversal + weight * (area_below * below as f64 + area_above * above as f64))
         };
         self.consider(cost(below + planar, above), Plane { axis, at, planar_below: true });
         if planar > 0 {

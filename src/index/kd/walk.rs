@@ -52,16 +52,16 @@ impl Framed {
         Self { origin, inverse, near, pad: inverse.map(|x| x.abs() * near) }
     }
 
-    /// Where the ray is in the box −1 … 1.
-    fn range(&self) -> Option<(f64, f64)> {
+    /// Where the ray is in the box of the mesh.
+    fn range(&self, half: [f64; 3]) -> Option<(f64, f64)> {
         let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
         for axis in 0..3 {
             if self.inverse[axis] == 0.0 {
-                if self.origin[axis].abs() > 1.0 + self.near {
+                if self.origin[axis].abs() > half[axis] + self.near {
                     return None;
                 }
             } else {
-                let [a, b] = [-1.0, 1.0].map(|face| (face - self.origin[axis]) * self.inverse[axis]);
+                let [a, b] = [-half[axis], half[axis]].map(|face| (face - self.origin[axis]) * self.inverse[axis]);
                 from = from.max(a.min(b) - self.pad[axis]);
                 to = to.min(a.max(b) + self.pad[axis]);
             }
@@ -79,7 +79,7 @@ pub fn hits<T: Scalar, N: Nodes, B>(
     mut visit: impl FnMut(Hit<T>) -> ControlFlow<B, T>,
 ) -> ControlFlow<B> {
     let framed = Framed::new(ray, triangles);
-    let Some((from, to)) = framed.range() else {
+    let Some((from, to)) = framed.range(triangles.frame.half) else {
         return ControlFlow::Continue(());
     };
     let mut limit: f64 = ray.max.into();
