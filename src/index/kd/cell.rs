@@ -44,7 +44,7 @@ pub enum Node {
     Inner {
         axis: usize,
         at: f32,
-        children: [Cell; 2],
+        children: Box<[Cell; 2]>,
     },
     /// Triangles, in rising order.
     Leaf(Vec<u32>),
@@ -110,7 +110,7 @@ impl Cell {
         let [below, above] = halves.parts;
         let child = |bounds, parts, search| Cell { bounds, depth: depth + 1, parts, search };
         let ([cell_below, cell_above], [search_below, search_above]) = (cells, searches);
-        let children = [child(cell_below, below, search_below), child(cell_above, above, search_above)];
+        let children = Box::new([child(cell_below, below, search_below), child(cell_above, above, search_above)]);
         Node::Inner { axis: plane.axis, at: plane.at, children }
     }
 

@@ -23,9 +23,9 @@ impl Aabb {
     pub const NOTHING: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
 
     pub fn with(mut self, p: [f32; 3]) -> Self {
-        for axis in 0..3 {
-            self.min[axis] = self.min[axis].min(p[axis]);
-            self.max[axis] = self.max[axis].max(p[axis]);
+        for (axis, x) in p.into_iter().enumerate() {
+            self.min[axis] = self.min[axis].min(x);
+            self.max[axis] = self.max[axis].max(x);
         }
         self
     }
@@ -164,8 +164,8 @@ mod tests {
                 }
             }
             let left = clip(&[a, b, c], &cell).expect("it has a point there");
-            for axis in 0..3 {
-                assert!(left.min[axis] <= on_edge[axis] && on_edge[axis] <= left.max[axis], "seed {seed}");
+            for (axis, &x) in on_edge.iter().enumerate() {
+                assert!(left.min[axis] <= x && x <= left.max[axis], "seed {seed}");
                 assert!(left.min[axis] >= cell.min[axis] && left.max[axis] <= cell.max[axis], "seed {seed}");
             }
             cut += usize::from(left.max != cell.max && left.min != cell.min);

@@ -48,7 +48,7 @@ impl Seed {
             let cell = self.cell.lock().unwrap_or_else(PoisonError::into_inner).take();
             match cell.map(|cell| cell.open(task)) {
                 Some(Node::Inner { axis, at, children }) => {
-                    Grown::Inner { axis, at, children: Box::new(children.map(Seed::new)) }
+                    Grown::Inner { axis, at, children: Box::new((*children).map(Seed::new)) }
                 }
                 Some(Node::Leaf(faces)) => Grown::Leaf(faces.into_boxed_slice()),
                 // Taken once, inside of what runs once.

@@ -41,7 +41,8 @@ impl Tree {
     fn push(&mut self, cell: Cell, task: &Task, parallel: bool) {
         match cell.open(task) {
             Node::Leaf(faces) => self.push_leaf(&faces),
-            Node::Inner { axis, at, children: [below, above] } => {
+            Node::Inner { axis, at, children } => {
+                let [below, above] = *children;
                 let node = self.push_inner(axis, at);
                 if parallel && below.len() + above.len() >= PARALLEL {
                     let mut other = Self::default();

@@ -55,13 +55,13 @@ impl Framed {
     /// Where the ray is in the box of the mesh.
     fn range(&self, half: [f64; 3]) -> Option<(f64, f64)> {
         let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
-        for axis in 0..3 {
+        for (axis, half) in half.into_iter().enumerate() {
             if self.inverse[axis] == 0.0 {
-                if self.origin[axis].abs() > half[axis] + self.near {
+                if self.origin[axis].abs() > half + self.near {
                     return None;
                 }
             } else {
-                let [a, b] = [-half[axis], half[axis]].map(|face| (face - self.origin[axis]) * self.inverse[axis]);
+                let [a, b] = [-half, half].map(|face| (face - self.origin[axis]) * self.inverse[axis]);
                 from = from.max(a.min(b) - self.pad[axis]);
                 to = to.min(a.max(b) + self.pad[axis]);
             }
@@ -89,7 +89,7 @@ pub fn hits<T: Scalar, N: Nodes, B>(
         n_pending -= 1;
         let (mut node, from, mut to) = pending[n_pending];
         // A hit may lie before its cell by as much as planes are thick, which `from` allows for.
-        if !(from <= to.min(limit)) {
+        if from > to.min(limit) {
             continue;
         }
         loop {
