@@ -7,7 +7,7 @@
 //!
 //! # Precision
 //!
-//! Planes are single precision in either case, in a frame that the mesh's box fills: half the memory of a node, one builder,
+//! Planes are single precision in either case, in a frame that the mesh's box fills: nodes of eight bytes, one builder,
 //! and the same tree at every power of two of the unit. Rays treat planes as thick as that rounding, and test triangles
 //! with the corners as given, so a tree finds what a test of every triangle finds ([`EveryTriangle`]); only triangles smaller
 //! than some 10⁻⁷ of the mesh cannot be kept apart.
