@@ -1,0 +1,170 @@
+//! Files: dialogs, dropped files, the clipboard.
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc;
+
+use eframe::egui;
+
+use super::app::Viewer;
+use super::engine::Message;
+
+/// What a dialog was for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    Open,
+    SavePicture,
+    SaveSettings,
+    Reference,
+}
+
+/// A dialog under way, on a thread of its own.
+pub struct Dialog {
+    purpose: Purpose,
+    answer: mpsc::Receiver<Option<PathBuf>>,
+}
+
+const SCENES: &[&str] = &["glb", "gltf", "obj", "toml"];
+
+fn ask(viewer: &mut Viewer, purpose: Purpose) {
+    if viewer.dialog.is_some() {
+        return;
+    }
+    let (sender, answer) = mpsc::channel();
+    let stem = viewer.wanted.scene.as_ref().map(|choice| Path::new(&choice.name).file_stem().unwrap_or_default().to_string_lossy().into_owned());
+    let name = stem.unwrap_or_else(|| "picture".to_owned());
+    let wake = viewer.wake();
+    std::thread::spawn(move || {
+        let dialog = rfd::FileDialog::new();
+        let path = match purpose {
+            Purpose::Open => dialog.set_title("Open a scene").add_filter("Scenes and settings", SCENES).pick_file(),
+            Purpose::SavePicture => dialog
+                .set_title("Save the picture")
+                .set_file_name(format!("{name}.exr"))
+                .add_filter("OpenEXR, PNG", &["exr", "png"])
+                .save_file(),
+            Purpose::SaveSettings => dialog
+                .set_title("Save the settings")
+                .set_file_name(format!("{name}.toml"))
+                .add_filter("Settings", &["toml"])
+                .save_file(),
+            Purpose::Reference => dialog.set_title("Open a reference").add_filter("OpenEXR", &["exr"]).pick_file(),
+        };
+        let _ = sender.send(path);
+        wake();
+    });
+    viewer.dialog = Some(Dialog { purpose, answer });
+}
+
+/// Takes the answer of a dialog, if there is one.
+pub fn poll(ui: &egui::Ui, viewer: &mut Viewer) {
+    let Some(dialog) = &viewer.dialog else { return };
+    let answer = match dialog.answer.try_recv() {
+        Ok(answer) => answer,
+        Err(mpsc::TryRecvError::Empty) => return,
+        Err(mpsc::TryRecvError::Disconnected) => None,
+    };
+    let purpose = dialog.purpose;
+    viewer.dialog = None;
+    let Some(path) = answer else { return };
+    match purpose {
+        Purpose::Open => viewer.open(path.to_string_lossy()),
+        Purpose::SavePicture => {
+            viewer.output = Some(path.clone());
+            viewer.save_to(path);
+        }
+        Purpose::SaveSettings => save_settings(ui, viewer, &path),
+        Purpose::Reference => super::compare::load(ui, viewer, &path),
+    }
+}
+
+pub fn open(viewer: &mut Viewer) {
+    ask(viewer, Purpose::Open);
+}
+
+/// Where it went last, else asks.
+pub fn save(viewer: &mut Viewer) {
+    match viewer.output.clone() {
+        Some(path) => viewer.save_to(path),
+        None => save_as(viewer),
+    }
+}
+
+pub fn save_as(viewer: &mut Viewer) {
+    if viewer.opened().is_some() {
+        ask(viewer, Purpose::SavePicture);
+    }
+}
+
+pub fn ask_settings(viewer: &mut Viewer) {
+    if viewer.opened().is_some() {
+        ask(viewer, Purpose::SaveSettings);
+    }
+}
+
+pub fn ask_reference(viewer: &mut Viewer) {
+    ask(viewer, Purpose::Reference);
+}
+
+/// A scene, settings, or a reference picture.
+pub fn dropped(ui: &egui::Ui, viewer: &mut Viewer, path: &Path) {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    match extension.as_deref() {
+        Some("exr") => super::compare::load(ui, viewer, path),
+        Some(e) if SCENES.contains(&e) => viewer.open(path.to_string_lossy()),
+        _ => {
+            let text = format!("{}: neither a scene (.glb, .gltf, .obj, .toml) nor a reference (.exr)", path.display());
+            viewer.say(ui, Message::Error(text));
+        }
+    }
+}
+
+/// The settings as the command line reads them.
+fn save_settings(ui: &egui::Ui, viewer: &mut Viewer, path: &Path) {
+    let message = match viewer.settings_text(path) {
+        Ok(text) => match sunfleck::output::atomic::write(path, |writer| std::io::Write::write_all(writer, text.as_bytes())) {
+            Ok(()) => Message::Said(format!("saved {}", path.display())),
+            Err(error) => Message::Error(error.to_string()),
+        },
+        Err(error) => Message::Error(crate::one_line(&crate::chain(&error))),
+    };
+    viewer.say(ui, message);
+}
+
+pub fn copy_command(ui: &egui::Ui, viewer: &mut Viewer) {
+    if let Some(command) = viewer.command() {
+        ui.ctx().copy_text(command);
+        viewer.say(ui, Message::Said("copied the command".to_owned()));
+    }
+}
+
+/// Asks for a picture of the window; it arrives with the input of a later frame.
+pub fn screenshot(ui: &egui::Ui) {
+    ui.ctx().send_viewport_cmd(egui::ViewportCommand::Screenshot(egui::UserData::default()));
+}
+
+/// Writes the picture of the window that has arrived.
+pub fn take_screenshot(ui: &egui::Ui, viewer: &mut Viewer) {
+    let image = ui.input(|i| {
+        i.raw.events.iter().find_map(|event| match event {
+            egui::Event::Screenshot { image, .. } => Some(std::sync::Arc::clone(image)),
+            _ => None,
+        })
+    });
+    let Some(image) = image else { return };
+    let path = free_name("sunfleck-window", "png");
+    let [width, height] = image.size;
+    let written = image::save_buffer(&path, image.as_raw(), width as u32, height as u32, image::ColorType::Rgba8);
+    viewer.say(
+        ui,
+        match written {
+            Ok(()) => Message::Said(format!("saved {}", path.display())),
+            Err(error) => Message::Error(format!("{}: {error}", path.display())),
+        },
+    );
+}
+
+/// In the working folder, not there yet.
+fn free_name(stem: &str, extension: &str) -> PathBuf {
+    let name = |i: u32| PathBuf::from(format!("{stem}-{i}.{extension}"));
+    (1..).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0))
+}
