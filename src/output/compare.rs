@@ -22,8 +22,8 @@ pub struct Difference {
     pub pixels: usize,
 }
 
-/// Compares two pictures of the same size and crop; otherwise says what differs.
-pub fn compare(picture: &Picture, reference: &Picture) -> Result<Difference, String> {
+/// Whether two pictures have the same size and crop; otherwise says what differs.
+pub(super) fn same_window(picture: &Picture, reference: &Picture) -> Result<(), String> {
     let window = |p: &Picture| {
         let ([width, height], [x0, y0, x1, y1]) = (p.size, p.crop);
         format!("{width}x{height} with data from ({x0}, {y0}) to ({x1}, {y1})")
@@ -31,6 +31,12 @@ pub fn compare(picture: &Picture, reference: &Picture) -> Result<Difference, Str
     if (picture.size, picture.crop) != (reference.size, reference.crop) {
         return Err(format!("the windows differ: {} and {}", window(picture), window(reference)));
     }
+    Ok(())
+}
+
+/// Compares two pictures of the same size and crop; otherwise says what differs.
+pub fn compare(picture: &Picture, reference: &Picture) -> Result<Difference, String> {
+    same_window(picture, reference)?;
     let mut errors = Vec::with_capacity(picture.rgb.len());
     let (mut difference, mut brightness, mut max) = (0.0, 0.0, 0.0f64);
     for (x, y) in picture.rgb.iter().zip(&reference.rgb) {

@@ -1,8 +1,15 @@
-//! Pictures on disk: OpenEXR with everything needed to make them again, PNG to look at, and how two pictures differ.
+//! Pictures on disk: OpenEXR with everything needed to make them again, PNG to look at; pictures on a screen; and how
+//! two pictures differ.
 
 pub mod atomic;
 pub mod compare;
+pub mod convergence;
+pub mod difference;
+pub mod display;
 pub mod exr;
+pub mod false_colour;
+pub mod flip;
+pub mod histogram;
 pub mod png;
 pub mod tonemap;
 

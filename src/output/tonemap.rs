@@ -72,11 +72,13 @@ fn agx(rgb: [f32; 3]) -> [f32; 3] {
 fn agx_curve(x: f32, pivot: f32) -> f32 {
     const SLOPE: f32 = 2.0;
     const MIDDLE: f32 = 0.5;
-    let (sign, power, run) = if x < pivot { (-1.0, 3.0, pivot) } else { (1.0, 3.25, 1.0 - pivot) };
-    let reach = SLOPE * run; // What a straight line would reach.
-    let k = reach / ((reach / MIDDLE).powf(power) - 1.0).powf(1.0 / power);
-    let u = SLOPE * (x - pivot).abs();
-    MIDDLE + sign * u / (1.0 + (u / k).powf(power)).powf(1.0 / power)
+    let side = |sign: f32, power: f32, run: f32| {
+        let reach = SLOPE * run; // What a straight line would reach.
+        let k = reach / ((reach / MIDDLE).powf(power) - 1.0).powf(1.0 / power);
+        let u = SLOPE * (x - pivot).abs();
+        MIDDLE + sign * u / (1.0 + (u / k).powf(power)).powf(1.0 / power)
+    };
+    if x < pivot { side(-1.0, 3.0, pivot) } else { side(1.0, 3.25, 1.0 - pivot) }
 }
 
 /// IEC 61966-2-1: display-linear to encoded, both in [0, 1].
