@@ -1,15 +1,143 @@
 //! The paint thread: from the newest film to what the window shows.
+//!
+//! It has threads of its own, or a slow iteration would keep a change of exposure waiting.
 
 use std::sync::Arc;
 
-use super::{Board, Frame, Shared};
-use sunfleck::output::png::Look;
+use anyhow::Result;
+use sunfleck::inspect::{self, FirstHits};
+use sunfleck::layout::Photon;
+use sunfleck::output::compare::compare;
+use sunfleck::output::convergence::Halves;
+use sunfleck::output::difference::{self, Measure};
+use sunfleck::output::display::{self, Look};
+use sunfleck::output::false_colour::{self, Scale};
+use sunfleck::output::flip::{self, flip};
+use sunfleck::output::histogram::Histogram;
+use sunfleck::output::Picture;
 
-/// What is shown of a film.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+use super::{Board, Frame, Measured, Reference, Shared};
+
+/// What is shown of a render.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum View {
     #[default]
     Picture,
+    /// Luminance in stops about mid grey, in false colour.
+    Stops,
+    Direct,
+    Caustic,
+    Indirect,
+    Albedo,
+    Normal,
+    Depth,
+    PhotonCount,
+    Radius,
+    Variance,
+    NodesVisited,
+}
+
+impl View {
+    pub const ALL: [Self; 12] = [
+        Self::Picture,
+        Self::Stops,
+        Self::Direct,
+        Self::Caustic,
+        Self::Indirect,
+        Self::Albedo,
+        Self::Normal,
+        Self::Depth,
+        Self::PhotonCount,
+        Self::Radius,
+        Self::Variance,
+        Self::NodesVisited,
+    ];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Picture => "Picture",
+            Self::Stops => "False colour",
+            Self::Direct => "Direct light",
+            Self::Caustic => "Caustics",
+            Self::Indirect => "Indirect light",
+            Self::Albedo => "Albedo",
+            Self::Normal => "Normal",
+            Self::Depth => "Depth",
+            Self::PhotonCount => "Gathered photons",
+            Self::Radius => "Radius",
+            Self::Variance => "Variance",
+            Self::NodesVisited => "Nodes visited",
+        }
+    }
+
+    /// For people.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Self::Picture => "what is rendered",
+            Self::Stops => "luminance in stops about mid grey, after exposure",
+            Self::Direct => "what the eye path finds, and the light sampled at its end",
+            Self::Caustic => "photons that met only mirrors and glass since the lamp",
+            Self::Indirect => "all other photons",
+            Self::Albedo => "base colour of what is seen first",
+            Self::Normal => "shading normal of what is seen first, world space",
+            Self::Depth => "distance of what is seen first along the view, metres",
+            Self::PhotonCount => "photons in a pixel's estimate, mean over iterations",
+            Self::Radius => "radius of the estimate, metres",
+            Self::Variance => "estimated variance of the pixel's mean luminance",
+            Self::NodesVisited => "nodes of the tree entered to gather a pixel",
+        }
+    }
+
+    /// Whether it is made from an iteration's photons, read back.
+    pub fn needs_photons(self) -> bool {
+        matches!(self, Self::Direct | Self::Caustic | Self::Indirect | Self::PhotonCount | Self::NodesVisited)
+    }
+}
+
+/// How the picture is set beside the reference.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Comparison {
+    #[default]
+    Off,
+    /// The reference right of a line; the window draws it.
+    Wipe,
+    Difference(Measure),
+    /// FLIP, of both as they are shown.
+    Flip,
+}
+
+/// Of an iteration, read back from the device.
+#[derive(Debug, Default)]
+pub struct Insides {
+    pub split: inspect::Split,
+    pub nodes_visited: Vec<u32>,
+    pub photons: Vec<Photon>,
+}
+
+/// The numbers behind the colours.
+#[derive(Clone, Debug)]
+pub enum Values {
+    Rgb(Arc<Vec<[f32; 3]>>),
+    Scalar(Arc<Vec<f32>>),
+}
+
+/// What the colours of a scalar mean.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Legend {
+    pub range: [f32; 2],
+    pub log: bool,
+    /// Green to red about 0.
+    pub signed: bool,
+}
+
+/// What of `Wanted` a painting depends on.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Painting {
+    pub look: Look,
+    pub view: View,
+    pub comparison: Comparison,
+    /// Photons drawn over the picture.
+    pub photons: Option<inspect::ColorBy>,
 }
 
 /// A picture for the window.
@@ -21,35 +149,260 @@ pub struct Painted {
     pub rgba: Vec<u8>,
     /// What it was made from.
     pub frame: Arc<Frame>,
-    pub look: Look,
-    pub view: View,
+    pub painting: Painting,
     /// Stops; found automatically if the look has none.
     pub exposure: f32,
+    pub values: Values,
+    pub legend: Option<Legend>,
+    pub histogram: Histogram,
+    /// The reference as the picture is shown.
+    pub reference: Option<(Arc<Reference>, Vec<u8>)>,
+    /// Mean of the comparison that is shown.
+    pub mean: Option<f64>,
+    /// Why what was wanted could not be painted.
+    pub problem: Option<String>,
+}
+
+impl Painted {
+    /// Of a pixel: red, green and blue, or one number.
+    pub fn value(&self, x: usize, y: usize) -> Vec<f32> {
+        let i = y * self.size[0] + x;
+        match &self.values {
+            Values::Rgb(values) => values.get(i).map(|v| v.to_vec()).unwrap_or_default(),
+            Values::Scalar(values) => values.get(i).map(|&v| vec![v]).unwrap_or_default(),
+        }
+    }
 }
 
 /// Until the interface is gone.
 pub fn run(shared: &Shared) {
+    let n_threads = (rayon::current_num_threads() / 2).max(1);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build();
+    let mut painter = Painter::default();
     loop {
-        let (frame, look, view) = {
+        let (frame, reference, painting) = {
             let board = shared.wait_until(|board| board.frame.as_ref().is_some_and(|frame| !is_painted(board, frame)));
             if board.quit {
                 break;
             }
             let Some(frame) = board.frame.clone() else { continue };
-            (frame, board.wanted.look, board.wanted.view)
+            (frame, board.reference.clone(), board.wanted.painting)
         };
-        let painted = Arc::new(paint(frame, look, view));
-        shared.update(|board| board.painted = Some(painted));
+        let mut work = || {
+            let measured = painter.measure(&frame, reference.as_deref());
+            (Arc::new(painter.paint(&frame, reference, painting)), measured)
+        };
+        // Without a pool of its own it takes the common one.
+        let (painted, (estimated, against_reference)) = match &pool {
+            Ok(pool) => pool.install(work),
+            Err(_) => work(),
+        };
+        shared.update(|board| {
+            board.painted = Some(painted);
+            if frame.estimate == board.estimate && !frame.is_preview {
+                push(&mut board.history.estimated, frame.film.n_iterations, estimated);
+                push(&mut board.history.against_reference, frame.film.n_iterations, against_reference);
+            }
+        });
+    }
+}
+
+fn push(list: &mut Vec<Measured>, iteration: u32, rel_mse: Option<f64>) {
+    if let Some(rel_mse) = rel_mse
+        && list.last().is_none_or(|last| last.iteration < iteration)
+    {
+        list.push(Measured { iteration, rel_mse });
     }
 }
 
 fn is_painted(board: &Board, frame: &Arc<Frame>) -> bool {
+    let same_reference = |a: Option<&Arc<Reference>>, b: Option<&Arc<Reference>>| match (a, b) {
+        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+        (a, b) => a.is_none() && b.is_none(),
+    };
     board.painted.as_ref().is_some_and(|painted| {
         Arc::ptr_eq(&painted.frame, frame)
-            && (painted.look, painted.view) == (board.wanted.look, board.wanted.view)
+            && painted.painting == board.wanted.painting
+            && same_reference(painted.reference.as_ref().map(|r| &r.0), fitting(board.reference.as_ref(), frame))
     })
 }
 
-fn paint(frame: Arc<Frame>, look: Look, view: View) -> Painted {
-    todo!()
+/// The reference, if it has the picture's size.
+fn fitting<'a>(reference: Option<&'a Arc<Reference>>, frame: &Frame) -> Option<&'a Arc<Reference>> {
+    reference.filter(|r| (r.picture.size, r.picture.crop) == (frame.params.size, frame.params.crop))
+}
+
+/// What is kept from frame to frame.
+#[derive(Default)]
+struct Painter {
+    halves: (u64, Halves),
+    hits: Option<(Arc<Frame>, FirstHits)>,
+}
+
+/// Colours, and what they stand for.
+struct Colours {
+    rgba: Vec<u8>,
+    values: Values,
+    legend: Option<Legend>,
+    mean: Option<f64>,
+}
+
+impl Painter {
+    /// Error estimated from the halves, and measured against the reference.
+    fn measure(&mut self, frame: &Frame, reference: Option<&Reference>) -> (Option<f64>, Option<f64>) {
+        if frame.is_preview {
+            return (None, None);
+        }
+        if self.halves.0 != frame.estimate {
+            self.halves = (frame.estimate, Halves::default());
+        }
+        self.halves.1.add(&frame.film);
+        let measured = reference.and_then(|r| compare(&frame.picture(), &r.picture).ok()).map(|d| d.rel_mse);
+        (self.halves.1.rel_mse(), measured)
+    }
+
+    fn paint(&mut self, frame: &Arc<Frame>, reference: Option<Arc<Reference>>, painting: Painting) -> Painted {
+        let picture = frame.picture();
+        let exposure = painting.look.exposure_of(&picture.rgb);
+        let tonemap = painting.look.tonemap;
+        let reference = fitting(reference.as_ref(), frame).map(|reference| {
+            let mut rgba = vec![];
+            display::rgba8(&reference.picture, exposure, tonemap, &mut rgba);
+            (Arc::clone(reference), rgba)
+        });
+        let histogram = Histogram::of(&picture.rgb, exposure);
+        let mut problem = None;
+        let compared = reference.as_ref().and_then(|(reference, _)| {
+            let done = compared(&picture, &reference.picture, &painting, exposure).transpose()?;
+            done.map_err(|error| problem = Some(error)).ok()
+        });
+        let mut colours = match compared {
+            Some(colours) => colours,
+            None => self.view(frame, picture, painting, exposure),
+        };
+        if let (Some(color), Some(insides)) = (painting.photons, &frame.insides) {
+            let style = inspect::Style { color, ..Default::default() };
+            let dots = inspect::draw(&insides.photons, self.hits(frame), &style);
+            for (to, from) in colours.rgba.chunks_exact_mut(4).zip(&dots) {
+                if from[3] > 0 {
+                    to[..3].copy_from_slice(&from[..3]);
+                }
+            }
+        }
+        Painted {
+            size: frame.params.film_size().map(|n| n as usize),
+            rgba: colours.rgba,
+            frame: Arc::clone(frame),
+            painting,
+            exposure,
+            values: colours.values,
+            legend: colours.legend,
+            histogram,
+            reference,
+            mean: colours.mean,
+            problem,
+        }
+    }
+
+    fn view(&mut self, frame: &Arc<Frame>, picture: Picture, painting: Painting, exposure: f32) -> Colours {
+        let part = |pick: fn(&inspect::Parts) -> [f32; 3]| {
+            frame.insides.as_ref().map(|insides| insides.split.pixels.iter().map(pick).collect::<Vec<_>>())
+        };
+        let as_picture = |rgb: Vec<[f32; 3]>| {
+            let picture = Picture { rgb, size: frame.params.size, crop: frame.params.crop, variance: None };
+            let mut rgba = vec![];
+            display::rgba8(&picture, exposure, painting.look.tonemap, &mut rgba);
+            Colours { rgba, values: Values::Rgb(Arc::new(picture.rgb)), legend: None, mean: None }
+        };
+        // Until the first iteration with photons has been read back, the picture stands for them.
+        let lit = |rgb: Option<Vec<[f32; 3]>>, picture: Picture| as_picture(rgb.unwrap_or(picture.rgb));
+        match painting.view {
+            View::Picture => as_picture(picture.rgb),
+            View::Stops => {
+                const STOPS: [f32; 2] = [-8.0, 8.0];
+                let mut rgba = vec![];
+                false_colour::luminance_in_stops(&picture.rgb, exposure, STOPS, &mut rgba);
+                let legend = Some(Legend { range: STOPS, log: false, signed: false });
+                Colours { rgba, values: Values::Rgb(Arc::new(picture.rgb)), legend, mean: None }
+            }
+            View::Direct => lit(part(|p| p.direct), picture),
+            View::Caustic => lit(part(|p| p.caustic), picture),
+            View::Indirect => lit(part(|p| p.indirect), picture),
+            View::Albedo => plain(self.hits(frame).base_colors(), |c| c),
+            View::Normal => plain(self.hits(frame).normals(), |c| 0.5 * c + 0.5),
+            View::Depth => scalar(self.hits(frame).depths(), false),
+            View::PhotonCount => scalar(
+                frame.insides.as_ref().map_or(vec![], |i| i.split.pixels.iter().map(|p| p.gathered).collect()),
+                true,
+            ),
+            View::NodesVisited => {
+                let nodes = frame.insides.as_ref().map_or(vec![], |i| i.nodes_visited.iter().map(|&n| n as f32).collect());
+                scalar(nodes, false)
+            }
+            View::Radius => {
+                let scale = frame.radius / frame.first_radius.max(f32::MIN_POSITIVE);
+                scalar(frame.first_radii.iter().map(|r| r * scale).collect(), true)
+            }
+            View::Variance => scalar(frame.film.variance_of_mean(), true),
+        }
+    }
+
+    fn hits(&mut self, frame: &Arc<Frame>) -> &FirstHits {
+        let same = |of: &Frame| {
+            Arc::ptr_eq(&of.scene, &frame.scene)
+                && of.camera == frame.camera
+                && (of.params.size, of.params.crop) == (frame.params.size, frame.params.crop)
+        };
+        let kept = self.hits.take().filter(|(of, _)| same(of));
+        let (_, hits) = self.hits.insert(kept.unwrap_or_else(|| (Arc::clone(frame), FirstHits::trace(&frame.scene, &frame.view()))));
+        hits
+    }
+}
+
+/// Nothing if no comparison is wanted that is painted here.
+fn compared(
+    picture: &Picture,
+    reference: &Picture,
+    painting: &Painting,
+    exposure: f32,
+) -> Result<Option<Colours>, String> {
+    let mut rgba = vec![];
+    let (values, legend, mean) = match painting.comparison {
+        Comparison::Off | Comparison::Wipe => return Ok(None),
+        Comparison::Difference(measure) => {
+            let image = difference::image(picture, reference, measure)?;
+            let legend = if measure == Measure::Signed {
+                let most = false_colour::signed(&image.values, None, &mut rgba);
+                Legend { range: [-most, most], log: false, signed: true }
+            } else {
+                let range = false_colour::scalar(&image.values, &Scale { range: None, log: false }, &mut rgba);
+                Legend { range, log: false, signed: false }
+            };
+            (image.values, legend, image.mean)
+        }
+        Comparison::Flip => {
+            let size = picture.crop_size();
+            let [x, y] = [picture, reference].map(|p| display::linear(&p.rgb, exposure, painting.look.tonemap));
+            let flip = flip(&x, &y, size, flip::PIXELS_PER_DEGREE)?;
+            let range = false_colour::scalar(&flip.error, &Scale { range: Some([0.0, 1.0]), log: false }, &mut rgba);
+            (flip.error, Legend { range, log: false, signed: false }, flip.mean)
+        }
+    };
+    Ok(Some(Colours { rgba, values: Values::Scalar(Arc::new(values)), legend: Some(legend), mean: Some(mean) }))
+}
+
+/// Numbers in false colour.
+fn scalar(values: Vec<f32>, log: bool) -> Colours {
+    let mut rgba = vec![];
+    let range = false_colour::scalar(&values, &Scale { range: None, log }, &mut rgba);
+    let legend = Some(Legend { range, log, signed: false });
+    Colours { rgba, values: Values::Scalar(Arc::new(values)), legend, mean: None }
+}
+
+/// Numbers in [0, 1] as they are.
+fn plain(values: Vec<[f32; 3]>, shown: fn(f32) -> f32) -> Colours {
+    use sunfleck::output::tonemap::srgb_encode;
+    let byte = |c: f32| (255.0 * srgb_encode(shown(c).clamp(0.0, 1.0)) + 0.5) as u8;
+    let rgba = values.iter().flat_map(|&[r, g, b]| [byte(r), byte(g), byte(b), 255]).collect();
+    Colours { rgba, values: Values::Rgb(Arc::new(values)), legend: None, mean: None }
 }
