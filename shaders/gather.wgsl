@@ -45,7 +45,7 @@ fn visit(visitor: ptr<function, Visitor>, slot: u32, delta: vec3<f32>, distance2
         || (facing < 0.0 && !(*visitor).both_sides) {
         return;
     }
-    if (*visitor).segments + (packed >> 24u) > frame.max_segments {
+    if (*visitor).segments + ((packed >> 24u) & MAX_PHOTON_SEGMENTS) > frame.max_segments {
         return;
     }
     let constant_kernel = (frame.flags & FRAME_CONSTANT_KERNEL) != 0u;

@@ -24,7 +24,7 @@ struct Primitive {
     c: vec3<f32>,
     flags: u32,
     vertices: vec3<u32>,
-    pad: u32,
+    object: u32,
 }
 
 const PRIMITIVE_SPHERE: u32 = 1u;
@@ -179,6 +179,9 @@ struct Photon {
     power: vec3<f32>,
     direction: u32,
 }
+
+const MAX_PHOTON_SEGMENTS: u32 = 127u;
+const PHOTON_CAUSTIC: u32 = 128u;
 
 struct PointBox {
     min: vec3<f32>,

@@ -42,12 +42,12 @@ fn photon_step(state: ptr<function, PathState>, slot: u32) -> bool {
     let power = (*state).power * absorbed(s, (*state).medium, hit.t);
     let incoming = -ray.direction;
     let bsdf = bsdf_new(s, incoming);
-    let is_direct = (*state).segments == 1u;
+    let is_direct = ((*state).segments & MAX_PHOTON_SEGMENTS) == 1u;
     let store = bsdf_gathered(bsdf) != 0u && !(is_direct && (frame.flags & FRAME_SAMPLE_DIRECT) != 0u);
     if store {
         slots[slot] = Photon(
             s.position,
-            oct_encode24(s.normal) | (min((*state).segments, 255u) << 24u),
+            oct_encode24(s.normal) | ((*state).segments << 24u),
             power * photon_shading(s, incoming),
             oct_encode(incoming),
         );
@@ -71,6 +71,9 @@ fn photon_step(state: ptr<function, PathState>, slot: u32) -> bool {
     }
     (*state).power = next;
     (*state).dimension = rng.dimension;
+    let was_caustic = is_direct || ((*state).segments & PHOTON_CAUSTIC) != 0u;
+    let caustic = was_caustic && scatter.specular && (bsdf_traced(bsdf) & LOBE_SPECULAR) != 0u;
+    (*state).segments = ((*state).segments & MAX_PHOTON_SEGMENTS) | select(0u, PHOTON_CAUSTIC, caustic);
     if scatter.transmitted {
         (*state).medium = beyond(s);
     }
@@ -84,10 +87,11 @@ var<workgroup> n_stored: atomic<u32>;
 var<workgroup> n_alive: atomic<u32>;
 
 // Reads states and counters, writes slots, counters and states; PATHS paths a thread.
-// values: paths in the chunk, first path, round.
+// values: paths in the chunk, first path, round, first workgroup.
 @compute @workgroup_size(64)
 fn trace_photons(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_invocation_index) local: u32) {
-    let thread = workgroup.x * 64u + local;
+    let group = arguments.values.w + workgroup.x;
+    let thread = group * 64u + local;
     if local == 0u {
         atomicStore(&n_stored, 0u);
         atomicStore(&n_alive, 0u);
@@ -102,14 +106,14 @@ fn trace_photons(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_inv
         state = states[GOING_ON + thread];
     }
     // The eye's side adds at least one segment.
-    let longest = min(frame.max_photon_segments, max(frame.max_segments, 1u) - 1u);
+    let longest = min(min(frame.max_photon_segments, MAX_PHOTON_SEGMENTS), max(frame.max_segments, 1u) - 1u);
     var stored = 0u;
     let bound = PATHS * (longest + 2u);
     for (var step = 0u; step < bound && state.left != 0u; step++) {
         if state.left < ACTIVE {
             state = photon_begin(state);
         }
-        if state.segments >= longest {
+        if (state.segments & MAX_PHOTON_SEGMENTS) >= longest {
             state.left &= ~ACTIVE;
         }
         if state.left >= ACTIVE {
@@ -129,7 +133,7 @@ fn trace_photons(@builtin(workgroup_id) workgroup: vec3<u32>, @builtin(local_inv
     atomicAdd(&n_alive, alive);
     workgroupBarrier();
     if local == 0u {
-        counters[BLOCKS + 2u * workgroup.x] = atomicLoad(&n_stored);
-        counters[BLOCKS + 2u * workgroup.x + 1u] = atomicLoad(&n_alive);
+        counters[BLOCKS + 2u * group] = atomicLoad(&n_stored);
+        counters[BLOCKS + 2u * group + 1u] = atomicLoad(&n_alive);
     }
 }

@@ -51,8 +51,8 @@ pub struct Primitive {
     pub flags: u32,
     /// Indices into the vertices.
     pub vertices: [u32; 3],
-    /// Zero.
-    pub pad: u32,
+    /// What it is part of: the index of a mesh, or the number of meshes and the index of a sphere.
+    pub object: u32,
 }
 
 /// The primitive is a sphere.
@@ -341,13 +341,33 @@ pub const EYE_GLOSSY: u32 = 2;
 pub struct Photon {
     /// Metres, world space.
     pub position: [f32; 3],
-    /// Geometric normal on the side the photon came from: octahedral, 12 bits a component, in the low 24 bits; segments of
-    /// the path so far, at most 255, in the high 8.
+    /// Geometric normal on the side the photon came from: octahedral, 12 bits a component, in the low 24 bits. In the high
+    /// 8: segments of the path so far, at most [`MAX_PHOTON_SEGMENTS`], and [`PHOTON_CAUSTIC`].
     pub normal_and_segments: u32,
     /// Flux, W, linear RGB, before the division by the number of paths.
     pub power: [f32; 3],
     /// Unit, towards where the photon came from, octahedral.
     pub direction: u32,
+}
+
+/// Longest photon path, segments, and the mask of their number in the high 8 bits of a photon's word.
+pub const MAX_PHOTON_SEGMENTS: u32 = 127;
+/// In the same 8 bits: since it left the lamp, the photon was deflected at least once, and only by what the eye path would
+/// have followed instead of gathering there (mirrors, clear glass, and coats nearly as smooth).
+pub const PHOTON_CAUSTIC: u32 = 128;
+
+impl Photon {
+    /// Of the path from the lamp to here; 1: straight from the lamp.
+    #[inline]
+    pub fn segments(&self) -> u32 {
+        self.normal_and_segments >> 24 & MAX_PHOTON_SEGMENTS
+    }
+
+    /// Whether it has [`PHOTON_CAUSTIC`].
+    #[inline]
+    pub fn is_caustic(&self) -> bool {
+        self.normal_and_segments >> 24 & PHOTON_CAUSTIC != 0
+    }
 }
 
 /// A box of the tree over points.

@@ -1,8 +1,7 @@
 //! Sunfleck: progressive photon mapping, and the neighbour search under it.
 //!
 //! Import order, left never names right: `math` → `index` → `points` → `device` → `layout` → `scene` → `ppm` → `cpu` |
-//! `gpu` → `output`.
-//! `cpu` and `gpu` do not know each other.
+//! `gpu` → `inspect` → `output`. `cpu` and `gpu` do not know each other.
 
 #[cfg(feature = "render")]
 pub mod cpu;
@@ -10,6 +9,8 @@ pub mod device;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod index;
+#[cfg(feature = "render")]
+pub mod inspect;
 pub mod layout;
 pub mod math;
 #[cfg(feature = "render")]

@@ -38,6 +38,8 @@ struct Scatter {
     weight: vec3<f32>,
     pdf: f32,
     transmitted: bool,
+    // Coat, metal or glass chose it, and not the Lambertian base.
+    specular: bool,
     ok: bool,
 }
 
@@ -279,7 +281,7 @@ fn bsdf_local_pdf(b: Bsdf, k: vec3<f32>, o: vec3<f32>, choice: Choice) -> f32 {
         / (spread * spread);
 }
 
-const ENDED: Scatter = Scatter(vec3<f32>(0.0), vec3<f32>(0.0), 0.0, false, false);
+const ENDED: Scatter = Scatter(vec3<f32>(0.0), vec3<f32>(0.0), 0.0, false, false, false);
 const NOWHERE: Weighed = Weighed(vec3<f32>(0.0), vec3<f32>(0.0), 0.0, false);
 
 // A direction for `known`, by three numbers in [0, 1).
@@ -332,7 +334,8 @@ fn bsdf_sample(b: Bsdf, known: vec3<f32>, lobes: u32, transport: u32, u: vec3<f3
         let swap = k.z * across / (dot(known, b.normal) * found.o.z);
         weight *= min(abs(swap), MAX_SHADING_CORRECTION);
     }
-    return Scatter(direction, weight, found.pdf, found.o.z < 0.0, true);
+    let specular = u.x >= choice.diffuse;
+    return Scatter(direction, weight, found.pdf, found.o.z < 0.0, specular, true);
 }
 
 // Coat, metal and glass as mirrors.

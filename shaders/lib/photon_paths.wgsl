@@ -25,6 +25,7 @@ struct PathState {
     direction: vec3<f32>,
     dimension: u32,
     power: vec3<f32>,
+    // As a photon has them in its high 8 bits: with PHOTON_CAUSTIC.
     segments: u32,
     medium: vec3<f32>,
     // Paths of the thread still to begin; with ACTIVE, the present one has not ended.

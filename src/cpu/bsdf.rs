@@ -70,6 +70,8 @@ pub struct Scatter {
     pub pdf: f32,
     /// Whether it went through.
     pub transmitted: bool,
+    /// Whether coat, metal or glass chose it, and not the Lambertian base.
+    pub specular: bool,
 }
 
 /// How probable the base, the coat or metal, and the glass are.
@@ -320,7 +322,8 @@ impl<'a> Bsdf<'a> {
         }
         let choice = self.choice(k.z, lobes);
         let square = [u[1], u[2]];
-        let (o, weight, pdf) = if u[0] < choice.diffuse {
+        let specular = u[0] >= choice.diffuse;
+        let (o, weight, pdf) = if !specular {
             let o = warp::cosine(square);
             if self.is_diffuse() {
                 (o, self.base_color, warp::cosine_pdf(o.z))
@@ -351,7 +354,7 @@ impl<'a> Bsdf<'a> {
         } else {
             weight
         };
-        Some(Scatter { direction, weight, pdf, transmitted: o.z < 0.0 })
+        Some(Scatter { direction, weight, pdf, transmitted: o.z < 0.0, specular })
     }
 
     /// Density and weight of a direction that any of the lobes may have chosen.

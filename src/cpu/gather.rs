@@ -121,22 +121,22 @@ impl<'a> Estimate<'a> {
         }
     }
 
-    /// Takes a photon within the radius, unless it lies on another surface.
+    /// Takes a photon within the radius, unless it lies on another surface or its path is too long; returns whether.
     #[inline]
-    pub fn add(&mut self, photon: &Photon, distance2: f32) {
+    pub fn add(&mut self, photon: &Photon, distance2: f32) -> bool {
         let offset = (Vec3::from(photon.position) - self.centre).dot(self.normal);
         if offset.abs() > MAX_PLANE_OFFSET * self.radius {
-            return;
+            return false;
         }
         let photon_normal = oct::decode24_unscaled(photon.normal_and_segments);
         let facing = photon_normal.dot(self.normal);
         if facing * facing < MIN_NORMAL_COSINE * MIN_NORMAL_COSINE * photon_normal.length_squared()
             || facing < 0.0 && !self.both_sides
         {
-            return;
+            return false;
         }
-        if self.segments + (photon.normal_and_segments >> 24) > self.frame.max_segments {
-            return;
+        if self.segments + photon.segments() > self.frame.max_segments {
+            return false;
         }
         let weight = if self.constant { 1.0 } else { 2.0 * (1.0 - distance2 * self.inverse_radius2) };
         let power = Vec3::from(photon.power) * weight;
@@ -148,6 +148,7 @@ impl<'a> Estimate<'a> {
             let lobes = Lobes { diffuse: false, specular: true };
             self.sums.glossy += power * bsdf.evaluate(*outgoing, incoming.normalize(), lobes, Transport::Radiance);
         }
+        true
     }
 
     /// Radiance towards the eye, what its path found included.

@@ -43,21 +43,33 @@ pub struct CpuStages {
 impl CpuStages {
     /// For a film of `size` pixels.
     pub fn new(scene: Arc<PackedScene>, camera: Camera, size: [u32; 2]) -> Self {
-        let n = size[0] as usize * size[1] as usize;
-        Self {
+        let mut stages = Self {
             scene,
             camera,
-            width: size[0],
-            height: size[1],
-            first_radii: vec![0.0; n],
+            width: 0,
+            height: 0,
+            first_radii: Vec::new(),
             vertices: Vec::new(),
             photons: Vec::new(),
             tree: PointBvh::default(),
-            radiance: vec![[0.0; 3]; n],
-            film: vec![[0.0; 4]; n],
+            radiance: Vec::new(),
+            film: Vec::new(),
             n_iterations: 0,
             times: StageTimes::default(),
-        }
+        };
+        stages.set_size(size);
+        stages
+    }
+
+    /// A black film, and nothing of what belonged to another.
+    fn set_size(&mut self, [width, height]: [u32; 2]) {
+        let n = width as usize * height as usize;
+        (self.width, self.height) = (width, height);
+        self.vertices.clear();
+        self.first_radii = vec![0.0; n];
+        self.radiance = vec![[0.0; 3]; n];
+        self.film = vec![[0.0; 4]; n];
+        self.n_iterations = 0;
     }
 }
 
@@ -69,6 +81,12 @@ impl Stages for CpuStages {
 
     fn camera(&self) -> Camera {
         self.camera
+    }
+
+    fn set_camera(&mut self, camera: Camera, film_size: [u32; 2]) -> Result<(), Error> {
+        self.camera = camera;
+        self.set_size(film_size);
+        Ok(())
     }
 
     fn trace_eye(&mut self, frame: &Frame) -> Result<(), Error> {

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::bsdf::{Bsdf, Lobes, Transport};
 use super::trace::{self, Ray, Seer};
 use super::{eye, light, surface};
-use crate::layout::{FRAME_ROULETTE, FRAME_SAMPLE_DIRECT, Frame, Photon};
+use crate::layout::{FRAME_ROULETTE, FRAME_SAMPLE_DIRECT, Frame, MAX_PHOTON_SEGMENTS, PHOTON_CAUSTIC, Photon};
 use crate::math::oct;
 use crate::math::rng::{Rng, Stream};
 use crate::scene::PackedScene;
@@ -38,9 +38,10 @@ pub fn trace(scene: &PackedScene, frame: &Frame, path: u32, sink: &mut impl Sink
     let (mut origin, mut direction, mut power) = (emission.origin, emission.direction, emission.power);
     sink.emitted(power);
     // The eye's side adds at least one segment.
-    let longest = frame.max_photon_segments.min(frame.max_segments.saturating_sub(1));
+    let longest = frame.max_photon_segments.min(MAX_PHOTON_SEGMENTS).min(frame.max_segments.saturating_sub(1));
     let mut medium = Vec3::ZERO;
     let mut segments = 0;
+    let mut caustic = false;
     while segments < longest {
         let ray = Ray { origin, direction, t_max: f32::INFINITY, alpha_seed: rng.alpha_seed(), seer: Seer::Light };
         segments += 1;
@@ -59,7 +60,8 @@ pub fn trace(scene: &PackedScene, frame: &Frame, path: u32, sink: &mut impl Sink
         if (gathered.diffuse || gathered.specular) && !(is_direct && frame.flags & FRAME_SAMPLE_DIRECT != 0) {
             sink.store(Photon {
                 position: s.position.to_array(),
-                normal_and_segments: oct::encode24(s.normal) | segments.min(255) << 24,
+                normal_and_segments: oct::encode24(s.normal)
+                    | (segments | if caustic { PHOTON_CAUSTIC } else { 0 }) << 24,
                 power: (power * shading(&s, incoming)).to_array(),
                 direction: oct::encode(incoming),
             });
@@ -84,6 +86,7 @@ pub fn trace(scene: &PackedScene, frame: &Frame, path: u32, sink: &mut impl Sink
         if power.max_element() <= 0.0 {
             return;
         }
+        caustic = (is_direct || caustic) && scatter.specular && bsdf.traced().specular;
         if scatter.transmitted {
             medium = eye::beyond(scene, &s);
         }

@@ -64,15 +64,15 @@ pub struct Params {
     pub direct: Direct,
     /// End paths by Russian roulette; without it they run to `max_eye_segments` and `max_photon_segments`.
     pub roulette: bool,
-    /// Longest eye path, segments (at most 255).
+    /// Longest eye path, segments (at most [`SEGMENT_CAP`]).
     pub max_eye_segments: u32,
-    /// Longest photon path, segments (at most 255).
+    /// Longest photon path, segments (at most [`layout::MAX_PHOTON_SEGMENTS`]).
     pub max_photon_segments: u32,
     /// Longest path from lamp to lens, segments; `u32::MAX`: no limit.
     pub max_segments: u32,
 }
 
-/// Cap on the segments of an eye or photon path that nobody asked to limit; a photon counts them in 8 bits.
+/// Cap on the segments of an eye path that nobody asked to limit; an eye vertex counts them in 8 bits.
 pub const SEGMENT_CAP: u32 = 255;
 
 impl Params {
@@ -89,7 +89,7 @@ impl Params {
             direct: Direct::default(),
             roulette: true,
             max_eye_segments: SEGMENT_CAP,
-            max_photon_segments: SEGMENT_CAP,
+            max_photon_segments: layout::MAX_PHOTON_SEGMENTS,
             max_segments: u32::MAX,
         }
     }
@@ -123,7 +123,7 @@ impl Params {
             seed: self.seed,
             n_paths: self.n_paths,
             max_eye_segments: self.max_eye_segments.min(SEGMENT_CAP),
-            max_photon_segments: self.max_photon_segments.min(SEGMENT_CAP),
+            max_photon_segments: self.max_photon_segments.min(layout::MAX_PHOTON_SEGMENTS),
             max_segments: self.max_segments,
             flags,
             radius_scale: RadiusSchedule::new(self.alpha).scale(i.max(1)),

@@ -37,6 +37,10 @@ pub trait Stages {
     /// The camera of this render.
     fn camera(&self) -> Camera;
 
+    /// Another camera and film, pixels (width, height), for the same scene: [`super::start`] comes next, and then the film
+    /// is that of stages made anew.
+    fn set_camera(&mut self, camera: Camera, film_size: [u32; 2]) -> Result<(), Error>;
+
     /// One eye path per film pixel, to the vertex where photons are gathered; direct light included.
     fn trace_eye(&mut self, frame: &Frame) -> Result<(), Error>;
 

@@ -132,7 +132,7 @@ impl PackedScene {
 
     fn pack_primitives(&mut self, scene: &Scene) -> Vec<Primitive> {
         let mut primitives = Vec::new();
-        for mesh in &scene.meshes {
+        for (object, mesh) in (0..).zip(&scene.meshes) {
             let material = &scene.materials[mesh.material];
             // No opacity reaches such a cut-off: glTF has the mesh vanish.
             if matches!(material.alpha, AlphaMode::Mask(cutoff) if cutoff > 1.0) {
@@ -182,11 +182,11 @@ impl PackedScene {
                     c,
                     flags: flags | if mirrored { layout::PRIMITIVE_MIRRORED_UV } else { 0 },
                     vertices: t.map(|i| first + i),
-                    pad: 0,
+                    object,
                 });
             }
         }
-        for s in &scene.spheres {
+        for (object, s) in (scene.meshes.len() as u32..).zip(&scene.spheres) {
             let material = &scene.materials[s.material];
             let mut flags = layout::PRIMITIVE_SPHERE;
             if s.inward {
@@ -201,6 +201,7 @@ impl PackedScene {
                 b: [s.radius, 0.0, 0.0],
                 light: NONE,
                 flags,
+                object,
                 ..Primitive::default()
             });
         }

@@ -7,9 +7,9 @@ use glam::{Mat2, Vec2, Vec3, Vec4};
 use sunfleck::cpu::CpuStages;
 use sunfleck::cpu::bsdf::{Bsdf, Lobes, Transport};
 use sunfleck::gpu::{BsdfQuery, GpuStages};
-use sunfleck::layout::{EyeVertex, Photon};
+use sunfleck::layout::{self, EyeVertex, Photon};
 use sunfleck::math::{oct, rng};
-use sunfleck::ppm::{Direct, Error, Params, Stages, iterate};
+use sunfleck::ppm::{Direct, Error, Params, Stages, iterate, start};
 use sunfleck::scene::{
     AlphaMode, Camera, Environment, Image, Material, Mesh, PackedScene, PunctualKind, PunctualLight, Scene, Sphere,
     Texture, Wrap,
@@ -261,6 +261,8 @@ fn photon_paths_agree(scene: &Scene, params: &Params) {
     let (missing, extra) = (a.len() - found_in(&a, &b), b.len() - found_in(&b, &a));
     println!("{} and {} photons; {missing} missing, {extra} extra", a.len(), b.len());
     assert!(a.len() > 10_000, "only {} photons", a.len());
+    let n_caustic = a.iter().filter(|p| p.is_caustic()).count();
+    assert!(n_caustic > 20 && n_caustic < a.len(), "{n_caustic} of {} are caustic", a.len());
     // A path that goes another way takes the rest of its photons with it.
     assert!((missing + extra) * 100 <= a.len(), "{missing} missing, {extra} extra of {}", a.len());
     let power =
@@ -320,6 +322,54 @@ fn the_same_seed_gives_the_same_bits_on_the_gpu() {
         films.push(gpu.film().expect("film").pixels.into_iter().flatten().map(f32::to_bits).collect::<Vec<_>>());
     }
     assert!(films[0] == films[1]);
+}
+
+/// The bits of a film after two iterations.
+fn film_bits(stages: &mut dyn Stages, params: &Params) -> Vec<u32> {
+    start(stages, params).expect("start");
+    for i in 1..=2 {
+        iterate(stages, &params.frame(i)).expect("iteration");
+        stages.times().expect("times");
+    }
+    let film = stages.film().expect("film");
+    assert_eq!(([film.width, film.height], film.n_iterations), (params.film_size(), 2));
+    film.pixels.into_iter().flatten().map(f32::to_bits).collect()
+}
+
+/// A render, then others by the same stages: each the same as by stages of its own.
+fn camera_can_be_replaced<S: Stages>(mut make: impl FnMut(layout::Camera, [u32; 2]) -> S) {
+    let from = |x: f32| Camera::look_at("", Vec3::new(x, 1.5, 4.0), Vec3::new(0.0, 0.5, 0.0), Vec3::Y, 0.9);
+    let first = Params { n_paths: 40_000, ..Params::new(SIZE, SIZE) };
+    let mut stages = make(from(0.5).pack(SIZE, SIZE), first.film_size());
+    film_bits(&mut stages, &first);
+    for (x, [width, height]) in [(-1.0, [24, 16]), (1.5, [120, 80])] {
+        let params = Params { crop: [3, 2, width, height], n_paths: 40_000, ..Params::new(width, height) };
+        let camera = from(x).pack(width, height);
+        stages.set_camera(camera, params.film_size()).expect("room");
+        assert_eq!(stages.camera(), camera);
+        let anew = film_bits(&mut make(camera, params.film_size()), &params);
+        assert!(film_bits(&mut stages, &params) == anew, "{width}×{height}");
+    }
+}
+
+#[test]
+fn another_camera_is_as_good_as_new_stages_on_the_cpu() {
+    let packed = Arc::new(PackedScene::new(&everything()));
+    camera_can_be_replaced(|camera, size| CpuStages::new(packed.clone(), camera, size));
+}
+
+/// However long the dispatches: those of the first stages are cut, those they are compared with are not.
+#[test]
+fn another_camera_is_as_good_as_new_stages_on_the_gpu() {
+    let Some(context) = context() else { return };
+    let packed = PackedScene::new(&everything());
+    let mut seconds = 0.0;
+    camera_can_be_replaced(|camera, _| {
+        let mut stages = GpuStages::new(context.clone(), &packed, camera).expect("stages");
+        stages.set_dispatch_seconds(seconds);
+        seconds = 10.0;
+        stages
+    });
 }
 
 #[test]

@@ -149,7 +149,7 @@ fn brute_force(frame: &Frame, vertex: &EyeVertex, radius: f32, photons: &[Photon
             let cosine = normal.dot(oct::decode24(p.normal_and_segments).as_dvec3());
             let off = delta.dot(normal).abs() / (0.1 * r);
             let side = oct::decode(p.direction).as_dvec3().dot(shading);
-            let segments = (vertex.flags >> 8 & 255) + (p.normal_and_segments >> 24);
+            let segments = (vertex.flags >> 8 & 255) + p.segments();
             if segments > frame.max_segments {
                 continue;
             }

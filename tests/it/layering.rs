@@ -3,7 +3,7 @@
 use std::path::Path;
 
 /// Each module with those it may use.
-const ALLOWED: [(&str, &[&str]); 10] = [
+const ALLOWED: [(&str, &[&str]); 11] = [
     ("math", &[]),
     ("index", &["math"]),
     ("device", &["index"]),
@@ -13,6 +13,7 @@ const ALLOWED: [(&str, &[&str]); 10] = [
     ("ppm", &["scene", "layout", "device", "index", "math"]),
     ("cpu", &["ppm", "scene", "layout", "device", "index", "math"]),
     ("gpu", &["ppm", "scene", "layout", "device", "index", "math"]),
+    ("inspect", &["cpu", "ppm", "scene", "layout", "index", "math"]),
     ("output", &["ppm", "scene", "layout", "index", "math"]),
 ];
 

@@ -14,6 +14,8 @@ mod gpu_hardware;
 mod gpu_search;
 mod index;
 mod indices;
+#[cfg(feature = "render")]
+mod inspect;
 mod layering;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod layout;

@@ -32,7 +32,7 @@ const ROW_STEP: u32 = 64;
 const FIRST_CHUNK: u32 = 65536;
 /// Pixels of the largest dispatches: 112 bytes each have to fit a binding.
 const MOST_PIXELS: u32 = 1 << 19;
-/// Seconds a dispatch may take, well below what watchdogs allow.
+/// Seconds a dispatch may take unless the caller says, well below what watchdogs allow.
 const DISPATCH_SECONDS: f64 = 0.1;
 
 // The stages that are timed.
@@ -75,6 +75,8 @@ pub struct GpuStages {
     eye_chunk: u32,
     /// Pixels a gather dispatch handles.
     gather_chunk: u32,
+    /// What the chunks are chosen for.
+    dispatch_seconds: f64,
 }
 
 impl GpuStages {
@@ -138,7 +140,15 @@ impl GpuStages {
             n_iterations: 0,
             eye_chunk: FIRST_CHUNK,
             gather_chunk: FIRST_CHUNK,
+            dispatch_seconds: DISPATCH_SECONDS,
         })
+    }
+
+    /// How long one dispatch of eye paths, photon paths or the gather is to take at most, seconds (0.1 if never called):
+    /// short ones let whoever shares the device have a turn. It is aimed at from what [`Stages::times`] last read, down to
+    /// a smallest dispatch, and changes no bit of the picture.
+    pub fn set_dispatch_seconds(&mut self, seconds: f64) {
+        self.dispatch_seconds = seconds.max(0.0);
     }
 
     /// Room for the film's pixels.
@@ -213,6 +223,17 @@ impl Stages for GpuStages {
 
     fn camera(&self) -> Camera {
         self.camera
+    }
+
+    fn set_camera(&mut self, camera: Camera, film_size: [u32; 2]) -> Result<(), Error> {
+        self.camera = camera;
+        self.scene.set_camera(&self.context, &camera);
+        self.reserve_pixels(film_size[0] * film_size[1])?;
+        // Nothing of the old film is to be read.
+        self.n_pixels = 0;
+        self.film_size = [0, 0];
+        self.n_iterations = 0;
+        self.context.check()
     }
 
     fn trace_eye(&mut self, frame: &Frame) -> Result<(), Error> {
@@ -376,9 +397,11 @@ impl Stages for GpuStages {
         let times = StageTimes { eye, photons, build, gather, accumulate };
         for (seconds, chunk) in [(times.eye, &mut self.eye_chunk), (times.gather, &mut self.gather_chunk)] {
             if seconds > 0.0 {
-                *chunk = (f64::from(self.n_pixels) * DISPATCH_SECONDS / seconds).min(f64::from(MOST_PIXELS)) as u32;
+                let n = f64::from(self.n_pixels) * self.dispatch_seconds / seconds;
+                *chunk = n.min(f64::from(MOST_PIXELS)) as u32;
             }
         }
+        self.paths.fit(times.photons, self.dispatch_seconds);
         Ok(times)
     }
 }

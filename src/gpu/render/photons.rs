@@ -21,6 +21,8 @@ const SLOTS: u32 = 32;
 const N_TOTALS: u32 = 4;
 /// Threads a workgroup.
 const THREADS: u32 = 64;
+/// Workgroups of the smallest dispatches of paths.
+const FEWEST_GROUPS: u32 = 64;
 
 /// Kernels and memory of the photon paths.
 pub(super) struct PhotonPaths {
@@ -31,6 +33,10 @@ pub(super) struct PhotonPaths {
     slots: Array,
     counters: Array,
     states: Array,
+    /// Workgroups of the last [`PhotonPaths::trace`], all chunks together.
+    n_groups: u32,
+    /// Workgroups a dispatch of paths has at most.
+    most_groups: u32,
     /// Rounds each chunk gets. A thread that needs more shows in the counters; then all is done again with more.
     rounds: u32,
 }
@@ -46,6 +52,8 @@ impl PhotonPaths {
             slots: Array::new::<Photon>("photon slots"),
             counters: Array::new::<u32>("photon counters"),
             states: Array::new::<[u32; 16]>("photon paths"),
+            n_groups: 0,
+            most_groups: CHUNK / THREADS,
             rounds: 2,
         })
     }
@@ -68,6 +76,7 @@ impl PhotonPaths {
             let most = context.most_bytes_bound() / size_of::<Photon>() as u64;
             photons.reserve(context, (2 * u64::from(frame.n_paths)).min(most))?;
         }
+        self.n_groups = frame.n_paths.div_ceil(THREADS * PATHS);
         let most_rounds = (PATHS * frame.max_photon_segments).div_ceil(SLOTS).max(1);
         loop {
             self.rounds = self.rounds.min(most_rounds);
@@ -86,6 +95,14 @@ impl PhotonPaths {
             } else {
                 return Ok(n);
             }
+        }
+    }
+
+    /// Chooses the size of the dispatches of paths from the seconds the last ones took together, rounds and all.
+    pub(super) fn fit(&mut self, took: f64, dispatch_seconds: f64) {
+        if took > 0.0 {
+            let n = f64::from(self.n_groups) * dispatch_seconds / took;
+            self.most_groups = (n as u32).clamp(FEWEST_GROUPS, CHUNK / THREADS);
         }
     }
 
@@ -113,7 +130,14 @@ impl PhotonPaths {
             batch.dispatch(&self.emit, &[self.states.all()], [n, first, 0, 0], n.div_ceil(THREADS));
             for round in 0..self.rounds {
                 let buffers = [self.slots.all(), self.counters.all(), self.states.all()];
-                batch.dispatch(&self.trace, &buffers, [n, first, round, 0], groups);
+                for group in (0..groups).step_by(self.most_groups as usize) {
+                    if group > 0 {
+                        batch.submit()?;
+                        batch = Batch::new(context, shared, "photons");
+                    }
+                    let part = self.most_groups.min(groups - group);
+                    batch.dispatch(&self.trace, &buffers, [n, first, round, group], part);
+                }
                 let buffers = [self.slots.all(), self.counters.all(), self.states.all(), photons.all()];
                 let last = u32::from(round + 1 == self.rounds);
                 batch.dispatch(&self.offsets, &buffers, [groups, 0, 0, last], 1);

@@ -23,9 +23,10 @@ pub(super) struct Tables {
     has_extended: u32,
 }
 
-/// Buffers of a scene, which do not change, and the constants of the iteration, which do.
+/// Buffers of a scene, which do not change, and the constants of the camera and the iteration, which do.
 pub(super) struct SceneBuffers {
     frame: wgpu::Buffer,
+    camera: wgpu::Buffer,
     /// Kept for the memory they account for.
     _arrays: [Array; 6],
 }
@@ -75,13 +76,18 @@ impl SceneBuffers {
         let constants = Group::new(context, "constants", &bindings);
         let bindings = arrays.each_ref().map(|array| (storage(Access::Read), array.all()));
         let groups = vec![constants, Group::new(context, "scene", &bindings)];
-        let [frame, ..] = uniforms;
-        Ok((Self { frame, _arrays: arrays }, groups))
+        let [frame, camera, ..] = uniforms;
+        Ok((Self { frame, camera, _arrays: arrays }, groups))
     }
 
     /// Constants of this batch and those submitted after it.
     pub(super) fn set_frame(&self, batch: &Batch<'_>, frame: &Frame) {
         batch.write(&self.frame, bytemuck::bytes_of(frame));
+    }
+
+    /// Of the dispatches submitted from now on.
+    pub(super) fn set_camera(&self, context: &Context, camera: &Camera) {
+        context.queue.write_buffer(&self.camera, 0, bytemuck::bytes_of(camera));
     }
 }
 

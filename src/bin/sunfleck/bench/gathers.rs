@@ -100,7 +100,9 @@ impl<'a> Input<'a> {
         let tree = tree?;
         let each = |query: usize| {
             let mut estimate = self.estimate(query);
-            tree.within(self.queries[query], self.radii[query], |i, d2| estimate.add(&self.photons[i as usize], d2));
+            tree.within(self.queries[query], self.radii[query], |i, d2| {
+                estimate.add(&self.photons[i as usize], d2);
+            });
             estimate.radiance()
         };
         let (found, gather) = timed(|| (0..self.queries.len()).into_par_iter().with_min_len(256).map(each).collect());
