@@ -30,16 +30,21 @@ impl Camera {
 
     /// A pinhole at `position` looking at `target` with `up` above; `yfov` in radians, vertical.
     pub fn look_at(name: &str, position: Vec3, target: Vec3, up: Vec3, yfov: f32) -> Self {
-        let back = (position - target).normalize_or(Vec3::Z);
-        let right = up.cross(back).try_normalize().unwrap_or_else(|| back.any_orthonormal_vector());
-        let axes = Mat3A::from_cols(right.into(), back.cross(right).into(), back.into());
         Self {
             name: name.into(),
-            world_from_camera: Affine3A::from_mat3_translation(axes.into(), position),
+            world_from_camera: Self::stand(position, target - position, up),
             projection: Projection::Perspective { yfov },
             aperture_radius: 0.0,
             focus_distance: position.distance(target),
             aspect: None,
         }
+    }
+
+    /// World from camera at `position`, metres, looking along `forward` with `up` above, both of any length.
+    pub fn stand(position: Vec3, forward: Vec3, up: Vec3) -> Affine3A {
+        let back = (-forward).normalize_or(Vec3::Z);
+        let right = up.cross(back).try_normalize().unwrap_or_else(|| back.any_orthonormal_vector());
+        let axes = Mat3A::from_cols(right.into(), back.cross(right).into(), back.into());
+        Affine3A::from_mat3_translation(axes.into(), position)
     }
 }

@@ -233,6 +233,9 @@ impl Writer {
         let color = if intensity > 0.0 { light.intensity / intensity } else { Vec3::ONE };
         let mut value =
             json!({ "color": numbers(&color.to_array(), &place)?, "intensity": number(intensity, &place)? });
+        if !light.name.is_empty() {
+            value["name"] = json!(light.name);
+        }
         value["type"] = match light.kind {
             PunctualKind::Point => json!("point"),
             PunctualKind::Directional => json!("directional"),

@@ -241,8 +241,10 @@ pub struct Image {
 }
 
 /// A light without extent.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct PunctualLight {
+    /// For messages and for selection; may be empty.
+    pub name: String,
     /// World space, metres; of no meaning for a directional light.
     pub position: Vec3,
     /// Unit, the way the light travels; of no meaning for a point light.

@@ -14,17 +14,30 @@
 //! centre = [0.0, 1.0, 0.0]
 //! radius = 0.2
 //! glass = true
+//!
+//! [[material]] # one of the scene file, changed
+//! name = "floor"
+//! roughness = 0.2
+//!
+//! [[scene_light]] # one of the scene file, changed
+//! name = "sun"
+//! strength = 0.5
 //! ```
+//!
+//! An override may set any of it ([`Settings::set`]): `photons=2M`, `camera.yfov_degrees=40`, `material.floor.roughness=0.2`.
 
 mod apply;
+mod changes;
+mod difference;
+mod text;
 mod values;
 
+pub use changes::{MaterialSettings, SceneLightSettings};
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
-use toml::de::DeTable;
+use std::path::PathBuf;
 pub use values::{Count, Direct, FirstRadius, Kernel, LightKind, Size, parse_count};
 
-use super::load::{LoadError, files::read_regular};
+use super::load::LoadError;
 
 /// What a settings file says. A field left out has the default named, or keeps what the scene file says.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -75,6 +88,12 @@ pub struct Settings {
     /// Light from infinitely far away.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub environment: Option<EnvironmentSettings>,
+    /// Materials of the scene to change, in this order.
+    #[serde(rename = "material", skip_serializing_if = "Vec::is_empty")]
+    pub materials: Vec<MaterialSettings>,
+    /// Punctual lights of the scene to change, in this order. Emissive surfaces are lights by their material.
+    #[serde(rename = "scene_light", skip_serializing_if = "Vec::is_empty")]
+    pub scene_lights: Vec<SceneLightSettings>,
     /// Spheres to add.
     #[serde(rename = "sphere", skip_serializing_if = "Vec::is_empty")]
     pub spheres: Vec<SphereSettings>,
@@ -105,6 +124,9 @@ pub struct CameraSettings {
     /// Full vertical field of view, degrees.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub yfov_degrees: Option<f32>,
+    /// Half the height of the view, metres, of an orthographic camera; instead of `yfov_degrees`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ymag: Option<f32>,
     /// Radius of the lens, metres; 0 is a pinhole.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub aperture_radius: Option<f32>,
@@ -231,99 +253,3 @@ pub enum SettingsError {
 
 /// A dotted field and what is wrong with it.
 type Wrong = (String, String);
-
-impl Settings {
-    /// Reads a settings file and checks every value by itself.
-    pub fn load(path: &Path) -> Result<Self, SettingsError> {
-        /// A settings file is written by hand.
-        const MAX_BYTES: u64 = 16 << 20;
-        let unreadable = |problem| SettingsError::Unreadable { file: path.into(), problem };
-        let bytes = read_regular(path, MAX_BYTES).map_err(unreadable)?;
-        let text = String::from_utf8(bytes).map_err(|_| unreadable("is not UTF-8 text".into()))?;
-        Self::parse(&text, path)
-    }
-
-    /// Reads the text of a settings file; `file` is for messages.
-    pub fn parse(text: &str, file: &Path) -> Result<Self, SettingsError> {
-        let wrong = |offset: Option<usize>, field: String, problem: String| {
-            let line =
-                text.as_bytes()[..offset.unwrap_or(0).min(text.len())].iter().filter(|&&b| b == b'\n').count() + 1;
-            SettingsError::File { file: file.into(), line, field, problem }
-        };
-        let deserializer = toml::Deserializer::parse(text).map_err(|e| {
-            let offset = e.span().map(|span| span.start);
-            let line =
-                text.get(..offset.unwrap_or(0)).and_then(|before| text.lines().nth(before.matches('\n').count()));
-            wrong(offset, "TOML".into(), format!("{}: {:.80?}", e.message(), line.unwrap_or("").trim()))
-        })?;
-        let settings: Self = serde_path_to_error::deserialize(deserializer).map_err(|e| {
-            let field = e.path().to_string();
-            let span = e.inner().span().map(|span| span.start).or_else(|| offset_of(text, &field));
-            wrong(span, field, e.inner().message().into())
-        })?;
-        settings.check_values().map_err(|(field, problem)| wrong(offset_of(text, &field), field, problem))?;
-        Ok(settings)
-    }
-
-    /// Overrides one field: `camera.yfov_degrees=40`, `photons=2M`, `sphere.0.radius=0.5`.
-    ///
-    /// The value is TOML, or else text.
-    pub fn set(&mut self, assignment: &str) -> Result<(), SettingsError> {
-        let wrong = |(field, problem): Wrong| SettingsError::Field { field, problem };
-        let (key, value) = assignment
-            .split_once('=')
-            .ok_or_else(|| wrong((assignment.into(), "an override has the form field=value".into())))?;
-        let (key, value) = (key.trim(), value.trim());
-        let value = match toml::from_str::<toml::Table>(&format!("v = {value}")) {
-            Ok(mut table) if table.len() == 1 => table.remove("v"),
-            _ => None,
-        }
-        .unwrap_or_else(|| toml::Value::String(value.into()));
-        let mut root = toml::Value::try_from(&*self).map_err(|e| wrong((key.into(), e.to_string())))?;
-        *entry(&mut root, key).map_err(|problem| wrong((key.into(), problem)))? = value;
-        let changed: Self = serde_path_to_error::deserialize(root).map_err(|e| {
-            let field = e.path().to_string();
-            wrong((field, e.inner().message().into()))
-        })?;
-        changed.check_values().map_err(wrong)?;
-        *self = changed;
-        Ok(())
-    }
-}
-
-/// The value at a dotted key; tables on the way are made.
-fn entry<'v>(root: &'v mut toml::Value, key: &str) -> Result<&'v mut toml::Value, String> {
-    let mut value = root;
-    for part in key.split('.') {
-        value = match value {
-            toml::Value::Table(table) => table.entry(part).or_insert_with(|| toml::Value::Table(toml::Table::new())),
-            toml::Value::Array(list) => {
-                let n = list.len();
-                let index = part.parse::<usize>().map_err(|_| format!("{part:?} is not a number: there are {n}"))?;
-                list.get_mut(index).ok_or_else(|| format!("there is no number {index}: there are {n}, from 0"))?
-            }
-            _ => return Err(format!("{part:?} is not a field")),
-        };
-    }
-    Ok(value)
-}
-
-/// Where in the text the value of a dotted field begins, or the innermost table around it.
-fn offset_of(text: &str, field: &str) -> Option<usize> {
-    let table = DeTable::parse(text).ok()?;
-    let mut offset = None;
-    let mut value: Option<&toml::de::DeValue> = None;
-    // As serde_path_to_error writes them: a.b[0].c
-    for part in field.split(['.', '[', ']']).filter(|part| !part.is_empty()) {
-        let next = match (value, part.parse::<usize>()) {
-            (None, _) => table.get_ref().get(part),
-            (Some(toml::de::DeValue::Array(list)), Ok(index)) => list.get(index),
-            (Some(toml::de::DeValue::Table(table)), _) => table.get(part),
-            _ => None,
-        };
-        let Some(next) = next else { break };
-        offset = Some(next.span().start);
-        value = Some(next.get_ref());
-    }
-    offset
-}

@@ -109,6 +109,7 @@ fn everything() -> Scene {
         })
         .collect();
     let light = |strength: f32, kind| PunctualLight {
+        name: String::new(),
         position: Vec3::new(-1.0, 3.0, 2.0),
         direction: Vec3::new(0.3, -1.0, -0.4).normalize(),
         intensity: Vec3::new(4.0, 5.0, 6.0) * strength,

@@ -62,7 +62,13 @@ fn small(n_paths: u32) -> Params {
 }
 
 fn point_light(position: Vec3, intensity: f32) -> PunctualLight {
-    PunctualLight { position, direction: Vec3::NEG_Y, intensity: Vec3::splat(intensity), kind: PunctualKind::Point }
+    PunctualLight {
+        name: String::new(),
+        position,
+        direction: Vec3::NEG_Y,
+        intensity: Vec3::splat(intensity),
+        kind: PunctualKind::Point,
+    }
 }
 
 /// Inside a sphere that emits L and reflects ρ, radiance is L/(1 − ρ). The cap of a sphere within a chord r of a point
@@ -362,8 +368,13 @@ fn flux_is_balanced() {
 fn lights_emit_their_power() {
     let pi = std::f64::consts::PI;
     let (inner, outer) = (0.3f32, 0.6f32);
-    let light =
-        |kind| PunctualLight { position: Vec3::ZERO, direction: Vec3::new(0.6, -0.8, 0.0), intensity: Vec3::ONE, kind };
+    let light = |kind| PunctualLight {
+        name: String::new(),
+        position: Vec3::ZERO,
+        direction: Vec3::new(0.6, -0.8, 0.0),
+        intensity: Vec3::ONE,
+        kind,
+    };
     let ball = |material, lights: Vec<PunctualLight>, environment: Option<Environment>| Scene {
         spheres: vec![Sphere { centre: Vec3::ZERO, radius: 0.5, inward: false, material: 0 }],
         materials: vec![material],

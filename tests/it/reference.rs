@@ -78,6 +78,7 @@ fn read_scene(description: &Value) -> (Scene, Camera) {
     for light in list(&description["lights"]) {
         scene.lights.push(if light["type"] == "point" {
             PunctualLight {
+                name: String::new(),
                 position: vector(&light["position"]),
                 direction: Vec3::NEG_Y,
                 intensity: vector(&light["intensity"]),
@@ -85,6 +86,7 @@ fn read_scene(description: &Value) -> (Scene, Camera) {
             }
         } else {
             PunctualLight {
+                name: String::new(),
                 position: Vec3::ZERO,
                 direction: vector(&light["direction"]).normalize(),
                 intensity: vector(&light["illuminance"]),

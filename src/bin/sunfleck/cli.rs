@@ -114,6 +114,41 @@ pub struct RenderArgs {
     #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = positive_f64, help_heading = "Budget")]
     pub seconds: Option<f64>,
 
+    #[command(flatten)]
+    pub input: InputArgs,
+
+    /// Override a key of the settings file, such as camera.yfov_degrees=40 or material.NAME.roughness=0.2; repeatable
+    #[arg(long, value_name = "KEY=VALUE", help_heading = "Estimator")]
+    pub set: Vec<String>,
+
+    /// Where to compute; auto: a real GPU, else the CPU (software adapters only when named)
+    #[arg(long, value_parser = ["auto", "gpu", "cpu"], default_value = "auto", help_heading = "Device")]
+    pub backend: String,
+
+    /// GPU, by its number or a part of its name; see --list-devices
+    #[arg(long, value_name = "N|NAME", help_heading = "Device")]
+    pub device: Option<String>,
+
+    /// How the GPU finds photons; hardware: by ray queries, where the adapter has them (see --list-devices)
+    #[arg(long, value_parser = ["tree", "hardware"], default_value = "tree", help_heading = "Device")]
+    pub index: String,
+
+    /// CPU threads [default: all]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Device")]
+    pub threads: Option<u16>,
+
+    /// Say nothing but errors
+    #[arg(short, long, conflicts_with = "verbose", help_heading = "Messages")]
+    pub quiet: bool,
+
+    /// Say more: the scene, the radii, where the time went
+    #[arg(short, long, help_heading = "Messages")]
+    pub verbose: bool,
+}
+
+/// What is said over the settings of a scene: picture and estimator.
+#[derive(Clone, Debug, Default, Args)]
+pub struct InputArgs {
     /// Size of the picture [default: 720 high, as wide as the camera says or 1280]
     #[arg(short, long, value_name = "WxH", value_parser = size, help_heading = "Picture")]
     pub resolution: Option<[u32; 2]>,
@@ -161,34 +196,6 @@ pub struct RenderArgs {
     /// Of the random numbers: same seed, backend and device, same picture [default: 0]
     #[arg(long, value_name = "N", help_heading = "Estimator")]
     pub seed: Option<u32>,
-
-    /// Override a key of the settings file; repeatable
-    #[arg(long, value_name = "KEY=VALUE", help_heading = "Estimator")]
-    pub set: Vec<String>,
-
-    /// Where to compute; auto: a real GPU, else the CPU (software adapters only when named)
-    #[arg(long, value_parser = ["auto", "gpu", "cpu"], default_value = "auto", help_heading = "Device")]
-    pub backend: String,
-
-    /// GPU, by its number or a part of its name; see --list-devices
-    #[arg(long, value_name = "N|NAME", help_heading = "Device")]
-    pub device: Option<String>,
-
-    /// How the GPU finds photons; hardware: by ray queries, where the adapter has them (see --list-devices)
-    #[arg(long, value_parser = ["tree", "hardware"], default_value = "tree", help_heading = "Device")]
-    pub index: String,
-
-    /// CPU threads [default: all]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Device")]
-    pub threads: Option<u16>,
-
-    /// Say nothing but errors
-    #[arg(short, long, conflicts_with = "verbose", help_heading = "Messages")]
-    pub quiet: bool,
-
-    /// Say more: the scene, the radii, where the time went
-    #[arg(short, long, help_heading = "Messages")]
-    pub verbose: bool,
 }
 
 #[derive(Debug, Args)]

@@ -9,9 +9,9 @@ use sunfleck::output::png::Look;
 use sunfleck::ppm::{Direct, FirstRadius, Kernel, Params};
 use sunfleck::scene::defaults::{add_default_light, default_camera};
 use sunfleck::scene::load::{Loaded, load_environment};
-use sunfleck::scene::{Camera, Scene, settings};
+use sunfleck::scene::{Camera, Scene, Settings, settings};
 
-use crate::cli::{RenderArgs, Usage};
+use crate::cli::{InputArgs, RenderArgs, Usage};
 use crate::scenes::Source;
 
 /// Where nothing is said: as many iterations as look good on the shipped scenes, but no longer than one waits for.
@@ -73,73 +73,79 @@ impl Job {
             settings.set(pair).map_err(|e| Usage(format!("--set {pair}: {e}")))?;
         }
         source.locate();
-        let settings = &mut source.settings;
-        // What the command line names replaces what the file says, and is not looked for.
-        settings.environment = settings.environment.take().filter(|_| args.env.is_none());
-        settings.camera = settings.camera.take().filter(|_| args.camera.is_none());
+        let settings = &source.settings;
         let iterations = args.iterations.or(settings.iterations.map(|n| n.0));
         let budget = match (iterations, args.seconds.or(settings.seconds)) {
             (None, None) => Budget { iterations: Some(DEFAULT_ITERATIONS), seconds: Some(DEFAULT_SECONDS) },
             (iterations, seconds) => Budget { iterations, seconds },
         };
-        let radius = args.radius.or(settings.radius.map(first_radius)).unwrap_or_default();
+        let radius = args.input.radius.or(settings.radius.map(first_radius)).unwrap_or_default();
         Ok(Self {
             scene_name,
             outputs: args.output.clone(),
             look: Look { exposure: args.exposure.or(settings.exposure), tonemap: args.tonemap.unwrap_or_default() },
             budget,
-            one_radius: args.paper && radius == FirstRadius::Automatic,
+            one_radius: args.input.paper && radius == FirstRadius::Automatic,
             source,
         })
     }
 
     /// Reads the scene and chooses the camera and the estimator's parameters.
     pub fn load(&self, args: &RenderArgs) -> Result<Input> {
-        let mut loaded = self.source.scene()?;
-        if let Some(path) = &args.env {
-            let (environment, warnings) = load_environment(path)?;
-            loaded.scene.environment = Some(environment);
-            loaded.warnings.extend(warnings);
-        }
-        self.source.apply(&mut loaded)?;
-        let Loaded { mut scene, mut warnings } = loaded;
-        warnings.extend(add_default_light(&mut scene));
-        if scene.cameras.is_empty() {
-            scene.cameras.push(default_camera(&scene));
-        }
-        scene.check().with_context(|| self.scene_name.clone())?;
-        let camera = camera(&scene, args.camera.as_deref())?;
-        let params = self.params(args, &camera)?;
-        Ok(Input { scene, camera, params, warnings })
+        prepare(&self.source, &self.source.settings, self.source.scene()?, &args.input)
     }
+}
 
-    /// The command line over the settings over the defaults.
-    fn params(&self, args: &RenderArgs, camera: &Camera) -> Result<Params> {
-        let settings = &self.source.settings;
-        let size = args.resolution.or(settings.size.map(|size| size.0));
-        let [width, height] = size.unwrap_or_else(|| default_size(camera));
-        let mut params = Params::new(width, height);
-        if args.paper {
-            use_paper_mode(&mut params);
-        }
-        if let Some(crop) = args.crop {
-            let nothing = || Usage(format!("--crop: no pixel of {width}x{height} is left"));
-            params.crop = crop.pixels(params.size).ok_or_else(nothing)?;
-        }
-        params.seed = args.seed.or(settings.seed).unwrap_or(params.seed);
-        params.n_paths = args.photons.or(settings.photons.map(|n| n.0)).unwrap_or(params.n_paths);
-        params.alpha = args.alpha.or(settings.alpha).unwrap_or(params.alpha);
-        params.radius = args.radius.or(settings.radius.map(first_radius)).unwrap_or(params.radius);
-        params.kernel = args.kernel.or(settings.kernel.map(kernel)).unwrap_or(params.kernel);
-        params.direct = args.direct.or(settings.direct.map(direct)).unwrap_or(params.direct);
-        if let Some(n) = args.max_segments.or(settings.max_segments) {
-            params.max_segments = n;
-            params.max_eye_segments = params.max_eye_segments.min(n);
-            params.max_photon_segments = params.max_photon_segments.min(n);
-        }
-        check_memory(&params)?;
-        Ok(params)
+/// From a scene as its file has it to what the stages read: changed as `settings` say, and as `args` say over them.
+///
+/// `source` says where the scene came from; its own settings are not looked at.
+pub fn prepare(source: &Source, settings: &Settings, mut loaded: Loaded, args: &InputArgs) -> Result<Input> {
+    // What the command line names replaces what the file says, and is not looked for.
+    let mut settings = settings.clone();
+    settings.environment = settings.environment.filter(|_| args.env.is_none());
+    settings.camera = settings.camera.filter(|_| args.camera.is_none());
+    if let Some(path) = &args.env {
+        let (environment, warnings) = load_environment(path)?;
+        loaded.scene.environment = Some(environment);
+        loaded.warnings.extend(warnings);
     }
+    source.apply(&settings, &mut loaded)?;
+    let Loaded { mut scene, mut warnings } = loaded;
+    warnings.extend(add_default_light(&mut scene));
+    if scene.cameras.is_empty() {
+        scene.cameras.push(default_camera(&scene));
+    }
+    scene.check().with_context(|| source.name.clone())?;
+    let camera = camera(&scene, args.camera.as_deref())?;
+    let params = params(&settings, args, &camera)?;
+    Ok(Input { scene, camera, params, warnings })
+}
+
+/// The command line over the settings over the defaults.
+fn params(settings: &Settings, args: &InputArgs, camera: &Camera) -> Result<Params> {
+    let size = args.resolution.or(settings.size.map(|size| size.0));
+    let [width, height] = size.unwrap_or_else(|| default_size(camera));
+    let mut params = Params::new(width, height);
+    if args.paper {
+        use_paper_mode(&mut params);
+    }
+    if let Some(crop) = args.crop {
+        let nothing = || Usage(format!("--crop: no pixel of {width}x{height} is left"));
+        params.crop = crop.pixels(params.size).ok_or_else(nothing)?;
+    }
+    params.seed = args.seed.or(settings.seed).unwrap_or(params.seed);
+    params.n_paths = args.photons.or(settings.photons.map(|n| n.0)).unwrap_or(params.n_paths);
+    params.alpha = args.alpha.or(settings.alpha).unwrap_or(params.alpha);
+    params.radius = args.radius.or(settings.radius.map(first_radius)).unwrap_or(params.radius);
+    params.kernel = args.kernel.or(settings.kernel.map(kernel)).unwrap_or(params.kernel);
+    params.direct = args.direct.or(settings.direct.map(direct)).unwrap_or(params.direct);
+    if let Some(n) = args.max_segments.or(settings.max_segments) {
+        params.max_segments = n;
+        params.max_eye_segments = params.max_eye_segments.min(n);
+        params.max_photon_segments = params.max_photon_segments.min(n);
+    }
+    check_memory(&params)?;
+    Ok(params)
 }
 
 /// The setting of the literature.
@@ -207,7 +213,7 @@ fn check_outputs(args: &RenderArgs) -> Result<()> {
             bail!(Usage(format!("{} is to be written twice", path.display())));
         }
         let scene = args.scene.as_ref().map(PathBuf::from);
-        if scene.iter().chain(&args.env).any(|input| input.is_file() && same_file(input, path)) {
+        if scene.iter().chain(&args.input.env).any(|input| input.is_file() && same_file(input, path)) {
             bail!(Usage(format!("{} is read and to be written", path.display())));
         }
     }

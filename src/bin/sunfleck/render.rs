@@ -336,11 +336,15 @@ fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
 
 /// As it could be typed again.
 pub fn command_line() -> String {
-    let plain = |c: char| c.is_alphanumeric() || "-_=./,:+%@".contains(c);
-    let quote = |arg: String| match arg.chars().all(plain) && !arg.is_empty() {
-        true => arg,
-        false => format!("'{}'", arg.replace('\'', r"'\''")),
-    };
-    let args = std::env::args_os().skip(1).map(|arg| quote(arg.to_string_lossy().into_owned()));
+    let args = std::env::args_os().skip(1).map(|arg| quote(&arg.to_string_lossy()));
     std::iter::once("sunfleck".to_owned()).chain(args).collect::<Vec<_>>().join(" ")
+}
+
+/// An argument as a POSIX shell takes it.
+pub fn quote(arg: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_=./,:+%@".contains(c);
+    match arg.chars().all(plain) && !arg.is_empty() {
+        true => arg.to_owned(),
+        false => format!("'{}'", arg.replace('\'', r"'\''")),
+    }
 }

@@ -16,7 +16,7 @@ use crate::cli::{ExportArgs, Usage};
 /// What SCENE stands for.
 pub struct Source {
     /// As given.
-    name: String,
+    pub name: String,
     /// A scene file, or the name of a shipped scene.
     pub file: PathBuf,
     /// What the settings file says; nothing without one.
@@ -58,10 +58,9 @@ impl Source {
         Ok(load(&self.file)?)
     }
 
-    /// Changes a scene as the settings say.
-    pub fn apply(&self, loaded: &mut Loaded) -> Result<()> {
-        let warnings =
-            self.settings.apply_to_scene(&mut loaded.scene, &self.folder).with_context(|| self.name.clone())?;
+    /// Changes a scene as `settings` say, whose files lie where the settings file does.
+    pub fn apply(&self, settings: &Settings, loaded: &mut Loaded) -> Result<()> {
+        let warnings = settings.apply_to_scene(&mut loaded.scene, &self.folder).with_context(|| self.name.clone())?;
         loaded.warnings.extend(warnings);
         Ok(())
     }
@@ -125,7 +124,7 @@ pub fn export(args: &ExportArgs) -> Result<ExitCode> {
     atomic::check(path)?;
     let source = Source::resolve(&args.scene)?;
     let mut loaded = source.scene()?;
-    source.apply(&mut loaded)?;
+    source.apply(&source.settings, &mut loaded)?;
     let Loaded { scene, warnings } = loaded;
     for warning in warnings {
         eprintln!("sunfleck: warning: {}", crate::one_line(&warning));

@@ -75,7 +75,7 @@ fn assert_same(a: &Scene, b: &Scene) {
         assert!(near(&a.intensity.to_array(), &b.intensity.to_array()), "{a:?} {b:?}");
         assert!(a.kind == PunctualKind::Point || a.direction.dot(b.direction) > 1.0 - 1e-6, "{a:?} {b:?}");
         assert!(a.kind == PunctualKind::Directional || a.position.distance(b.position) < 1e-5, "{a:?} {b:?}");
-        assert_eq!(a.kind, b.kind);
+        assert_eq!((&a.name, a.kind), (&b.name, b.kind));
     }
     assert_eq!(a.cameras.len(), b.cameras.len());
     for (a, b) in a.cameras.iter().zip(&b.cameras) {
@@ -156,6 +156,7 @@ fn everything() -> Scene {
         material: 0,
     };
     let light = |kind| PunctualLight {
+        name: format!("a {kind:?}"),
         position: Vec3::new(1.0, 2.0, 3.0),
         direction: Vec3::new(1.0, -2.0, 0.5).normalize(),
         intensity: Vec3::new(10.0, 5.0, 2.5),

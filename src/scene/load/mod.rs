@@ -39,7 +39,7 @@ const MAX_COORDINATE: f32 = 1e9;
 const MAX_WARNINGS: usize = 100;
 
 /// A scene, and what in its file was not honoured.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Loaded {
     /// [`Scene::check`] holds, unless there is nothing to see in it; it may have no camera and no light.
     pub scene: Scene,

@@ -15,22 +15,28 @@ use std::path::Path;
 const MAX_SIDE: u32 = 16_384;
 
 /// Collects the first wrong value.
-struct Checks(Result<(), Wrong>);
+pub(super) struct Checks(Result<(), Wrong>);
 
 impl Checks {
-    fn require(&mut self, ok: bool, field: &str, problem: impl FnOnce() -> String) {
+    pub(super) fn require(&mut self, ok: bool, field: &str, problem: impl FnOnce() -> String) {
         if self.0.is_ok() && !ok {
             self.0 = Err((field.into(), problem()));
         }
     }
 
-    fn number(&mut self, field: &str, value: Option<f32>, range: impl Fn(f32) -> bool, expected: &str) {
+    pub(super) fn number(&mut self, field: &str, value: Option<f32>, range: impl Fn(f32) -> bool, expected: &str) {
         if let Some(value) = value {
             self.require(value.is_finite() && range(value), field, || format!("{value} is not {expected}"));
         }
     }
 
-    fn vector(&mut self, field: &str, value: Option<[f32; 3]>, range: impl Fn(Vec3) -> bool, expected: &str) {
+    pub(super) fn vector(
+        &mut self,
+        field: &str,
+        value: Option<[f32; 3]>,
+        range: impl Fn(Vec3) -> bool,
+        expected: &str,
+    ) {
         if let Some(value) = value.map(Vec3::from) {
             self.require(value.is_finite() && range(value), field, || format!("{value} is not {expected}"));
         }
@@ -44,19 +50,19 @@ impl Checks {
         self.vector(field, value, |v| v.try_normalize().is_some(), "a direction");
     }
 
-    fn color(&mut self, field: &str, value: Option<[f32; 3]>) {
+    pub(super) fn color(&mut self, field: &str, value: Option<[f32; 3]>) {
         self.vector(field, value, |v| v.min_element() >= 0.0, "a colour ≥ 0");
     }
 
-    fn positive(&mut self, field: &str, value: Option<f32>) {
+    pub(super) fn positive(&mut self, field: &str, value: Option<f32>) {
         self.number(field, value, |v| v > 0.0, "a positive number");
     }
 
-    fn not_negative(&mut self, field: &str, value: Option<f32>) {
+    pub(super) fn not_negative(&mut self, field: &str, value: Option<f32>) {
         self.number(field, value, |v| v >= 0.0, "a number ≥ 0");
     }
 
-    fn unit(&mut self, field: &str, value: Option<f32>) {
+    pub(super) fn unit(&mut self, field: &str, value: Option<f32>) {
         self.number(field, value, |v| (0.0..=1.0).contains(&v), "between 0 and 1");
     }
 }
@@ -91,6 +97,12 @@ impl Settings {
             c.not_negative("environment.strength", environment.strength);
             c.color("environment.color", environment.color);
         }
+        for (i, material) in self.materials.iter().enumerate() {
+            material.check(c, &format!("material[{i}]"));
+        }
+        for (i, light) in self.scene_lights.iter().enumerate() {
+            light.check(c, &format!("scene_light[{i}]"));
+        }
         for (i, sphere) in self.spheres.iter().enumerate() {
             sphere.check(c, &format!("sphere[{i}]"));
         }
@@ -100,17 +112,23 @@ impl Settings {
         checks.0
     }
 
-    /// Adds to and changes a scene as the settings say; the first camera is then the one to use.
+    /// Changes and adds to a scene, in this order, as the settings say; the first camera is then the one to use.
     ///
     /// `folder` is where the settings file lies. Returns warnings.
     pub fn apply_to_scene(&self, scene: &mut Scene, folder: &Path) -> Result<Vec<String>, SettingsError> {
         let wrong = |(field, problem): Wrong| SettingsError::Field { field, problem };
         self.check_values().map_err(wrong)?;
         let mut warnings = Vec::new();
+        for (i, material) in self.materials.iter().enumerate() {
+            material.apply(&mut scene.materials, &format!("material[{i}]")).map_err(wrong)?;
+        }
+        for (i, light) in self.scene_lights.iter().enumerate() {
+            light.apply(&mut scene.lights, &format!("scene_light[{i}]")).map_err(wrong)?;
+        }
         for (i, sphere) in self.spheres.iter().enumerate() {
             sphere.apply(scene, i).map_err(wrong)?;
         }
-        scene.lights.extend(self.lights.iter().map(LightSettings::light));
+        scene.lights.extend(self.lights.iter().enumerate().map(|(i, light)| light.light(i)));
         if let Some(environment) = &self.environment {
             let (map, mut more) = environment.environment(folder)?;
             scene.environment = Some(map);
@@ -148,6 +166,10 @@ impl CameraSettings {
             "look_at and forward exclude each other".into()
         });
         c.number("camera.yfov_degrees", self.yfov_degrees, |v| v > 0.0 && v < 180.0, "between 0 and 180 degrees");
+        c.positive("camera.ymag", self.ymag);
+        c.require(self.yfov_degrees.is_none() || self.ymag.is_none(), "camera.ymag", || {
+            "yfov_degrees and ymag exclude each other".into()
+        });
         c.not_negative("camera.aperture_radius", self.aperture_radius);
         c.positive("camera.focus_distance", self.focus_distance);
         if let (Some(position), Some(target)) = (self.position, self.look_at) {
@@ -192,6 +214,9 @@ impl CameraSettings {
         if let Some(yfov) = self.yfov_degrees {
             camera.projection = Projection::Perspective { yfov: yfov.to_radians() };
         }
+        if let Some(ymag) = self.ymag {
+            camera.projection = Projection::Orthographic { ymag };
+        }
         camera.aperture_radius = self.aperture_radius.unwrap_or(camera.aperture_radius);
         camera.focus_distance = self.focus_distance.unwrap_or(camera.focus_distance);
         scene.cameras.insert(0, camera);
@@ -202,7 +227,7 @@ impl CameraSettings {
 fn orient(position: Vec3, forward: Vec3, up: Vec3) -> Affine3A {
     // A camera may look straight up.
     let up = if up.cross(forward).length() > 1e-4 { up } else { forward.any_orthonormal_vector() };
-    Camera::look_at("", position, position + forward, up, 1.0).world_from_camera
+    Camera::stand(position, forward, up)
 }
 
 impl EnvironmentSettings {
@@ -306,9 +331,10 @@ impl LightSettings {
         (self.inner_degrees.unwrap_or(0.0), self.outer_degrees.unwrap_or(45.0))
     }
 
-    fn light(&self) -> PunctualLight {
+    fn light(&self, index: usize) -> PunctualLight {
         let (inner, outer) = self.cone();
         PunctualLight {
+            name: format!("light {index}"),
             position: self.position.map_or(Vec3::ZERO, Vec3::from),
             direction: self.direction.map_or(Vec3::NEG_Y, Vec3::from).normalize_or(Vec3::NEG_Y),
             intensity: self.color.map_or(Vec3::ONE, Vec3::from) * self.intensity,

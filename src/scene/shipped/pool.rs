@@ -77,6 +77,7 @@ pub(super) fn scene() -> Scene {
     things(&mut b);
 
     b.scene.lights.push(PunctualLight {
+        name: "sun".into(),
         position: Vec3::ZERO,
         direction: Vec3::new(-0.45, -1.0, -0.35).normalize(),
         intensity: Vec3::new(2.5, 2.3, 1.95),

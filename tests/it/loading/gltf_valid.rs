@@ -231,7 +231,7 @@ fn cameras_and_lights() {
         {"type": "orthographic", "orthographic": {"xmag": 3, "ymag": 2, "znear": 0, "zfar": 10}},
     ]);
     glb.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [
-        {"type": "point", "intensity": 100, "color": [1, 0.5, 0]},
+        {"name": "bulb", "type": "point", "intensity": 100, "color": [1, 0.5, 0]},
         {"type": "spot", "intensity": 10, "spot": {"innerConeAngle": 0.2, "outerConeAngle": 0.4}},
         {"type": "directional", "intensity": 5},
     ]}});
@@ -244,7 +244,7 @@ fn cameras_and_lights() {
         {"camera": 0, "translation": [0, 1, 5], "scale": [2, 2, 2]},
         {"camera": 1, "rotation": down},
         {"extensions": light(0), "translation": [0, 3, 0]},
-        {"extensions": light(1), "rotation": down},
+        {"name": "bulb", "extensions": light(1), "rotation": down},
         {"extensions": light(2), "rotation": down, "scale": [3, 3, 3]},
     ]);
     glb.json["nodes"] = nodes;
@@ -259,6 +259,7 @@ fn cameras_and_lights() {
     let [point, spot, sun] = &scene.lights[..] else { panic!("three lights") };
     assert_eq!((point.kind, point.intensity), (PunctualKind::Point, Vec3::new(100.0, 50.0, 0.0)));
     assert_eq!(point.position, Vec3::new(0.0, 3.0, 0.0));
+    assert_eq!([&point.name, &spot.name, &sun.name], ["bulb", "bulb 1", "light 2"]);
     assert_eq!(spot.kind, PunctualKind::Spot { inner: 0.2, outer: 0.4 });
     assert_eq!((sun.kind, sun.intensity), (PunctualKind::Directional, Vec3::splat(5.0)));
     for light in [spot, sun] {

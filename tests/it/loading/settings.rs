@@ -68,7 +68,7 @@ fn everything_at_once() {
     let glass = &scene.materials[scene.spheres[0].material];
     assert!(glass.volume && glass.ior == 1.6 && glass.alpha == AlphaMode::Opaque);
     assert_eq!(scene.materials[scene.spheres[1].material].name, "default");
-    let light = scene.lights[0];
+    let light = &scene.lights[0];
     assert_eq!((light.direction, light.intensity), (Vec3::NEG_Y, Vec3::new(200.0, 100.0, 0.0)));
     assert_eq!(light.kind, PunctualKind::Spot { inner: 0.0, outer: 30_f32.to_radians() });
     let environment = scene.environment.unwrap();

@@ -46,6 +46,7 @@ pub(super) struct Lights {
 
 #[derive(Debug, Deserialize)]
 pub(super) struct Light {
+    pub name: Option<String>,
     #[serde(rename = "type", default)]
     pub kind: String,
     #[serde(default = "white3")]

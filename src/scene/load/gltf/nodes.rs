@@ -112,7 +112,7 @@ impl Walk<'_> {
             let place = format!("{place}.extensions.KHR_lights_punctual.light");
             let lights = &self.document.extensions.lights.lights;
             let from = lookup(self.source, lights, light.light, "lights", &place)?;
-            self.light(from, world, &format!("extensions.KHR_lights_punctual.lights[{}]", light.light))?;
+            self.light(from, node, world, &format!("extensions.KHR_lights_punctual.lights[{}]", light.light))?;
         }
         Ok(())
     }
@@ -205,7 +205,7 @@ impl Walk<'_> {
         Ok(())
     }
 
-    fn light(&mut self, from: &document::Light, world: DAffine3, place: &str) -> Result<(), LoadError> {
+    fn light(&mut self, from: &document::Light, node: &Node, world: DAffine3, place: &str) -> Result<(), LoadError> {
         let kind = match from.kind.as_str() {
             "point" => PunctualKind::Point,
             "directional" => PunctualKind::Directional,
@@ -226,7 +226,12 @@ impl Walk<'_> {
         }
         let (position, direction) =
             (world.translation.as_vec3(), direction.unwrap_or(DVec3::NEG_Z).as_vec3().normalize());
-        self.found.lights.push(PunctualLight { position, direction, intensity, kind });
+        let n = self.found.lights.len();
+        let mut name = from.name.clone().or_else(|| node.name.clone()).unwrap_or_else(|| format!("light {n}"));
+        if self.found.lights.iter().any(|light| light.name == name) {
+            name = format!("{name} {n}");
+        }
+        self.found.lights.push(PunctualLight { name, position, direction, intensity, kind });
         Ok(())
     }
 
