@@ -123,8 +123,7 @@ pub fn prepare(source: &Source, settings: &Settings, mut loaded: Loaded, args: &
 
 /// The command line over the settings over the defaults.
 fn params(settings: &Settings, args: &InputArgs, camera: &Camera) -> Result<Params> {
-    let size = args.resolution.or(settings.size.map(|size| size.0));
-    let [width, height] = size.unwrap_or_else(|| default_size(camera));
+    let [width, height] = args.resolution.unwrap_or_else(|| size(settings, camera));
     let mut params = Params::new(width, height);
     if args.paper {
         use_paper_mode(&mut params);
@@ -177,7 +176,11 @@ fn direct(direct: settings::Direct) -> Direct {
     }
 }
 
-fn default_size(camera: &Camera) -> [u32; 2] {
+/// Of the picture, pixels: as the settings say, else as the camera.
+pub fn size(settings: &Settings, camera: &Camera) -> [u32; 2] {
+    if let Some(size) = settings.size {
+        return size.0;
+    }
     let [width, height] = DEFAULT_SIZE;
     match camera.aspect {
         Some(aspect) => [(aspect * height as f32).round().clamp(1.0, 16_384.0) as u32, height],
@@ -196,16 +199,28 @@ fn camera(scene: &Scene, wanted: Option<&str>) -> Result<Camera> {
     })
 }
 
+/// Refuses a picture that could not be written later.
+#[cfg(feature = "view")]
+pub fn check_output(path: &Path) -> Result<()> {
+    check_format(path)?;
+    Ok(atomic::check(path)?)
+}
+
+fn check_format(path: &Path) -> Result<()> {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    if !matches!(extension.as_deref(), Some("exr" | "png")) {
+        bail!(Usage(format!("-o {}: a picture ends in .exr or .png", path.display())));
+    }
+    Ok(())
+}
+
 /// Refuses what could not be written later, or would overwrite what is read.
 fn check_outputs(args: &RenderArgs) -> Result<()> {
     if args.output.is_empty() && args.json.is_none() {
         bail!(Usage("nowhere to put the picture: add -o out.png or -o out.exr".into()));
     }
     for path in &args.output {
-        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-        if !matches!(extension.as_deref(), Some("exr" | "png")) {
-            bail!(Usage(format!("-o {}: a picture ends in .exr or .png", path.display())));
-        }
+        check_format(path)?;
     }
     let files: Vec<_> = args.output.iter().chain(&args.json).collect();
     for (i, path) in files.iter().enumerate() {

@@ -156,6 +156,20 @@ fn scale_lights(scene: &mut Scene, factor: f32) {
     }
 }
 
+impl Settings {
+    /// The camera that these settings make of those of `scene`, which is as its file has it.
+    pub fn camera_of(&self, scene: &Scene) -> Result<Camera, SettingsError> {
+        let wrong = |(field, problem): Wrong| SettingsError::Field { field, problem };
+        self.check_values().map_err(wrong)?;
+        let cameras = if scene.cameras.is_empty() { vec![default_camera(scene)] } else { scene.cameras.clone() };
+        let mut cameras = Scene { cameras, ..Scene::default() };
+        if let Some(camera) = &self.camera {
+            camera.apply(&mut cameras).map_err(wrong)?;
+        }
+        Ok(cameras.cameras.swap_remove(0))
+    }
+}
+
 impl CameraSettings {
     fn check(&self, c: &mut Checks) {
         c.point("camera.position", self.position);

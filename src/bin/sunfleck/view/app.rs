@@ -1,9 +1,9 @@
 //! The window: its state, and what is where in it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use eframe::egui;
 use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::Camera;
@@ -68,8 +68,7 @@ pub struct Viewer {
 impl Viewer {
     pub fn new(storage: Option<&dyn eframe::Storage>, engine: Engine, wake: Wake, first: First) -> Self {
         let remembered = storage.and_then(|storage| eframe::get_value(storage, REMEMBERED)).unwrap_or_default();
-        let wanted =
-            Wanted { scene: first.choice.map(Arc::new), limits: first.limits, ..Wanted::default() };
+        let wanted = Wanted { scene: first.choice.map(Arc::new), limits: first.limits, ..Wanted::default() };
         let now = engine.now();
         Self {
             engine,
@@ -139,12 +138,12 @@ impl Viewer {
 
     /// Brightens the picture by so many stops.
     pub fn expose(&mut self, stops: f32) {
-        let now = self.wanted.look.exposure.or(self.now.painted.as_ref().map(|painted| painted.exposure));
-        self.wanted.look.exposure = Some((2.0 * (now.unwrap_or(0.0) + stops)).round() / 2.0);
+        let now = self.wanted.painting.look.exposure.or(self.now.painted.as_ref().map(|painted| painted.exposure));
+        self.wanted.painting.look.exposure = Some((2.0 * (now.unwrap_or(0.0) + stops)).round() / 2.0);
     }
 
     pub fn next_tone(&mut self) {
-        let tonemap = &mut self.wanted.look.tonemap;
+        let tonemap = &mut self.wanted.painting.look.tonemap;
         *tonemap = match tonemap {
             ToneMap::Neutral => ToneMap::Agx,
             ToneMap::Agx => ToneMap::Srgb,
@@ -165,22 +164,20 @@ impl Viewer {
         self.move_rig(time, &mut |rig| rig.frame_all(bounds, width as f32 / height as f32));
     }
 
-    /// The settings as a file at `path` would hold them: what they name is found from there.
-    pub fn settings_text(&self, path: &Path) -> Result<String> {
-        let opened = self.editing.as_ref().context("no scene is open")?;
-        let mut settings = self.edits.now().as_ref().clone();
-        settings.exposure = self.wanted.look.exposure;
-        opened.source.settings_at(&mut settings, path);
-        Ok(settings.to_toml())
+    /// The settings as a file holds them.
+    pub fn settings_text(&self) -> Option<String> {
+        let mut settings = self.editing.as_ref()?.source.rooted(self.edits.now());
+        settings.exposure = self.wanted.painting.look.exposure;
+        Some(settings.to_toml())
     }
 
     /// What renders this picture on the command line.
     pub fn command(&self) -> Option<String> {
         let opened = self.editing.as_ref()?;
         let iterations = self.now.frame.as_ref().map_or(1, |frame| frame.film.n_iterations.max(1));
-        let mut command = format!("sunfleck render {}", crate::render::quoted(&opened.source.name));
+        let mut command = format!("sunfleck render {}", crate::render::quote(&opened.source.name));
         for pair in self.edits.now().difference(&opened.read) {
-            command += &format!(" --set {}", crate::render::quoted(&pair));
+            command += &format!(" --set {}", crate::render::quote(&pair));
         }
         Some(format!("{command} --iterations {iterations} -o picture.exr"))
     }
@@ -197,7 +194,7 @@ impl Viewer {
 
     /// Writes the picture to `path`, as it looks now.
     pub fn save_to(&mut self, path: PathBuf) {
-        self.engine.save(Save { path, look: self.wanted.look });
+        self.engine.save(Save { path, look: self.wanted.painting.look });
     }
 
     /// Shows a message.
@@ -218,13 +215,13 @@ impl Viewer {
     pub fn show(&mut self, ui: &mut egui::Ui) {
         self.look_at_engine(ui);
         files::poll(ui, self);
-        files::take_screenshot(ui, self);
         super::keys::handle(ui, self);
         egui::Panel::top("bar").show(ui, |ui| super::bar::show(ui, self));
         egui::Panel::bottom("status").show(ui, |ui| super::bar::status(ui, self));
         if self.editing.is_some() {
             if self.remembered.show_convergence {
-                let panel = egui::Panel::bottom("convergence").resizable(true).default_size(220.0).size_range(120.0..=600.0);
+                let panel =
+                    egui::Panel::bottom("convergence").resizable(true).default_size(220.0).size_range(120.0..=600.0);
                 panel.show(ui, |ui| super::convergence::show(ui, self));
             }
             if self.remembered.show_settings {
@@ -261,7 +258,7 @@ impl Viewer {
                 self.remembered.opened(&opened.source.name);
                 if !is_reload {
                     self.edits = Edits::new(opened.source.settings.clone());
-                    self.wanted.look.exposure = opened.source.settings.exposure;
+                    self.wanted.painting.look.exposure = opened.source.settings.exposure;
                     self.picture = PictureView::default();
                 }
             }
@@ -276,7 +273,8 @@ impl Viewer {
         if ui.input(|i| i.viewport().title.as_ref() != Some(&title)) {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Title(title));
         }
-        if let Some(dropped) = ui.input(|i| i.raw.dropped_files.iter().find_map(|file| file.path.clone())) {
+        if let Some(dropped) = ui.input(|i| i.raw.dropped_files.iter().find_map(|file| Some(file.path().to_path_buf())))
+        {
             files::dropped(ui, self, &dropped);
         }
     }
@@ -288,24 +286,27 @@ impl Viewer {
             return;
         }
         let mut dismissed = None;
-        egui::Area::new("messages".into()).anchor(egui::Align2::RIGHT_BOTTOM, [-12.0, -36.0]).show(ui.ctx(), |ui| {
-            for (i, (_, message)) in self.messages.iter().enumerate() {
-                let (text, color) = match message {
-                    Message::Said(text) => (text, ui.visuals().text_color()),
-                    Message::Warning(text) => (text, ui.visuals().warn_fg_color),
-                    Message::Error(text) => (text, ui.visuals().error_fg_color),
-                };
-                egui::Frame::popup(ui.style()).show(ui, |ui| {
-                    ui.set_max_width(420.0);
-                    ui.horizontal_wrapped(|ui| {
-                        ui.colored_label(color, text);
-                        if ui.small_button("Dismiss").clicked() {
-                            dismissed = Some(i);
-                        }
+        egui::Area::new(egui::Id::unique("messages")).anchor(egui::Align2::RIGHT_BOTTOM, [-12.0, -36.0]).show(
+            ui.ctx(),
+            |ui| {
+                for (i, (_, message)) in self.messages.iter().enumerate() {
+                    let (text, color) = match message {
+                        Message::Said(text) => (text, ui.visuals().text_color()),
+                        Message::Warning(text) => (text, ui.visuals().warn_fg_color),
+                        Message::Error(text) => (text, ui.visuals().error_fg_color),
+                    };
+                    egui::Frame::popup(ui.style()).show(ui, |ui| {
+                        ui.set_max_width(420.0);
+                        ui.horizontal_wrapped(|ui| {
+                            ui.colored_label(color, text);
+                            if ui.small_button("Dismiss").clicked() {
+                                dismissed = Some(i);
+                            }
+                        });
                     });
-                });
-            }
-        });
+                }
+            },
+        );
         if let Some(i) = dismissed {
             self.messages.remove(i);
         }

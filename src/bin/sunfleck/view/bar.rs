@@ -13,7 +13,8 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
     egui::MenuBar::new().ui(ui, |ui| {
         let is_open = viewer.opened().is_some();
         ui.menu_button("File", |ui| {
-            if ui.button("Open …").on_hover_text("A scene: .glb, .gltf, .obj, or settings: .toml (Ctrl+O)").clicked() {
+            if ui.button("Open …").on_hover_text("A scene: .glb, .gltf, .obj, or settings: .toml (Ctrl+O)").clicked()
+            {
                 files::open(viewer);
             }
             ui.add_enabled_ui(is_open, |ui| {
@@ -26,7 +27,8 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
                 if ui.button("Save settings as …").on_hover_text("A .toml that `sunfleck render` reads").clicked() {
                     files::ask_settings(viewer);
                 }
-                if ui.button("Copy render command").on_hover_text("What renders this picture (Ctrl+Shift+C)").clicked() {
+                if ui.button("Copy render command").on_hover_text("What renders this picture (Ctrl+Shift+C)").clicked()
+                {
                     files::copy_command(ui, viewer);
                 }
                 if ui.button("Open reference …").on_hover_text("An .exr to compare with").clicked() {
@@ -40,7 +42,7 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
                 }
             });
             if ui.button("Screenshot").on_hover_text("Of the window, into the working folder (F12)").clicked() {
-                files::screenshot(ui);
+                files::screenshot(ui, viewer);
             }
             if ui.button("Quit").on_hover_text("Ctrl+Q").clicked() {
                 ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);

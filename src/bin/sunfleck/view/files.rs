@@ -30,7 +30,11 @@ fn ask(viewer: &mut Viewer, purpose: Purpose) {
         return;
     }
     let (sender, answer) = mpsc::channel();
-    let stem = viewer.wanted.scene.as_ref().map(|choice| Path::new(&choice.name).file_stem().unwrap_or_default().to_string_lossy().into_owned());
+    let stem = viewer
+        .wanted
+        .scene
+        .as_ref()
+        .map(|choice| Path::new(&choice.name).file_stem().unwrap_or_default().to_string_lossy().into_owned());
     let name = stem.unwrap_or_else(|| "picture".to_owned());
     let wake = viewer.wake();
     std::thread::spawn(move || {
@@ -120,12 +124,11 @@ pub fn dropped(ui: &egui::Ui, viewer: &mut Viewer, path: &Path) {
 
 /// The settings as the command line reads them.
 fn save_settings(ui: &egui::Ui, viewer: &mut Viewer, path: &Path) {
-    let message = match viewer.settings_text(path) {
-        Ok(text) => match sunfleck::output::atomic::write(path, |writer| std::io::Write::write_all(writer, text.as_bytes())) {
-            Ok(()) => Message::Said(format!("saved {}", path.display())),
-            Err(error) => Message::Error(error.to_string()),
-        },
-        Err(error) => Message::Error(crate::one_line(&crate::chain(&error))),
+    let Some(text) = viewer.settings_text() else { return };
+    let written = sunfleck::output::atomic::write(path, |writer| std::io::Write::write_all(writer, text.as_bytes()));
+    let message = match written {
+        Ok(()) => Message::Said(format!("saved {}", path.display())),
+        Err(error) => Message::Error(error.to_string()),
     };
     viewer.say(ui, message);
 }
@@ -137,30 +140,19 @@ pub fn copy_command(ui: &egui::Ui, viewer: &mut Viewer) {
     }
 }
 
-/// Asks for a picture of the window; it arrives with the input of a later frame.
-pub fn screenshot(ui: &egui::Ui) {
-    ui.ctx().send_viewport_cmd(egui::ViewportCommand::Screenshot(egui::UserData::default()));
-}
-
-/// Writes the picture of the window that has arrived.
-pub fn take_screenshot(ui: &egui::Ui, viewer: &mut Viewer) {
-    let image = ui.input(|i| {
-        i.raw.events.iter().find_map(|event| match event {
-            egui::Event::Screenshot { image, .. } => Some(std::sync::Arc::clone(image)),
-            _ => None,
-        })
-    });
-    let Some(image) = image else { return };
-    let path = free_name("sunfleck-window", "png");
-    let [width, height] = image.size;
-    let written = image::save_buffer(&path, image.as_raw(), width as u32, height as u32, image::ColorType::Rgba8);
-    viewer.say(
-        ui,
-        match written {
+/// Writes a picture of the window into the working folder.
+pub fn screenshot(ui: &egui::Ui, viewer: &Viewer) {
+    let say = viewer.engine().speaker();
+    let write = move |image: std::sync::Arc<egui::ColorImage>| {
+        let path = free_name("sunfleck-window", "png");
+        let [width, height] = image.size.map(|n| n as u32);
+        let written = image::save_buffer(&path, image.as_raw(), width, height, image::ColorType::Rgba8);
+        say(match written {
             Ok(()) => Message::Said(format!("saved {}", path.display())),
             Err(error) => Message::Error(format!("{}: {error}", path.display())),
-        },
-    );
+        });
+    };
+    ui.ctx().send_viewport_cmd(egui::ViewportCommand::Screenshot(egui::ScreenshotCallback::new(write)));
 }
 
 /// In the working folder, not there yet.

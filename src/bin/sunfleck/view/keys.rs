@@ -46,7 +46,7 @@ pub const SHORTCUTS: &[Shortcut] = &[
     command(Key::Y, "redo", |_, v| v.redo()),
     shift(Key::E, "half a stop darker", |_, v| v.expose(-0.5)),
     key(Key::E, "half a stop brighter", |_, v| v.expose(0.5)),
-    key(Key::X, "automatic exposure", |_, v| v.wanted.look.exposure = None),
+    key(Key::X, "automatic exposure", |_, v| v.wanted.painting.look.exposure = None),
     key(Key::T, "next tone curve", |_, v| v.next_tone()),
     key(Key::Space, "restart", |_, v| v.restart()),
     key(Key::P, "pause, go on", |_, v| v.wanted.paused = !v.wanted.paused),
@@ -57,7 +57,7 @@ pub const SHORTCUTS: &[Shortcut] = &[
     key(Key::F1, "settings, shown or hidden", |_, v| v.remembered.show_settings ^= true),
     key(Key::F2, "inspection, shown or hidden", |_, v| v.remembered.show_inspect ^= true),
     key(Key::F3, "convergence, shown or hidden", |_, v| v.remembered.show_convergence ^= true),
-    key(Key::F12, "save a picture of the window", |ui, _| files::screenshot(ui)),
+    key(Key::F12, "save a picture of the window", |ui, v| files::screenshot(ui, v)),
     key(Key::Questionmark, "this help", |_, v| v.show_help ^= true),
     key(Key::Escape, "close the help", |_, v| v.show_help = false),
 ];

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use eframe::egui;
-use egui::{Key, PointerButton, Pos2, Rect, Vec2, pos2, vec2};
+use egui::{Key, PointerButton, Rect, Vec2, pos2, vec2};
 use glam::Vec3;
 use sunfleck::scene::settings::{CameraSettings, Settings};
 
@@ -74,7 +74,7 @@ impl PictureView {
 /// The picture, in all of the room there is.
 pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
     let (area, response) = ui.allocate_exact_size(ui.available_size(), egui::Sense::click_and_drag());
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Image, true, "Picture"));
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Picture"));
     ui.painter().rect_filled(area, 0.0, egui::Color32::from_gray(24));
     if let Some(painted) = viewer.now.painted.clone() {
         viewer.picture.take(ui.ctx(), &painted);
@@ -250,11 +250,18 @@ impl Viewer {
         let known = self.picture.rig.as_ref().is_some_and(|(of, _)| Arc::ptr_eq(of, &settings));
         if !known {
             let (camera, bounds) = (self.camera()?, self.opened()?.bounds());
-            let same = |rig: &Rig| rig.camera().world_from_camera == camera.world_from_camera;
-            let rig = match self.picture.rig.take() {
-                Some((_, rig)) if same(&rig) => rig.with_lens_of(&camera),
-                _ => Rig::new(&camera, bounds),
-            };
+            let pivot = self
+                .picture
+                .rig
+                .take()
+                .map(|(_, rig)| rig)
+                .filter(|rig| rig.position() == Vec3::from(camera.world_from_camera.translation))
+                .map(|rig| rig.pivot());
+            let mut rig = Rig::new(&camera, bounds);
+            // A lens or a colour was changed, not the place.
+            if let Some(pivot) = pivot {
+                rig.set_pivot(pivot);
+            }
             self.picture.rig = Some((settings, rig));
         }
         self.picture.rig.as_mut().map(|(_, rig)| rig)
@@ -272,7 +279,7 @@ impl Viewer {
     }
 
     /// Of the picture that is wanted, pixels.
-    fn full_size(&self) -> Option<[u32; 2]> {
-        crate::job::size(self.edits.now(), &self.camera()?).into()
+    pub fn full_size(&self) -> Option<[u32; 2]> {
+        Some(crate::job::size(self.edits.now(), &self.camera()?))
     }
 }

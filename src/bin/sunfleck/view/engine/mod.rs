@@ -12,12 +12,14 @@ use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
-use sunfleck::output::png::Look;
-use sunfleck::ppm::{Film, StageTimes};
+use glam::Vec3;
+use sunfleck::output::Picture;
+use sunfleck::output::display::Look;
+use sunfleck::ppm::StageTimes;
 use sunfleck::scene::load::Loaded;
 use sunfleck::scene::settings::Settings;
 
-pub use paint::{Painted, View};
+pub use paint::{Comparison, Insides, Legend, Painted, Painting, Values, View};
 pub use session::Frame;
 
 use crate::devices::Device;
@@ -45,7 +47,7 @@ pub struct Choice {
 }
 
 /// What the interface wants. Cheap to clone and to compare.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Wanted {
     pub scene: Option<Arc<Choice>>,
     /// Counts requests to read the scene again.
@@ -60,25 +62,7 @@ pub struct Wanted {
     /// Iterations to do though paused: grows by one a step.
     pub steps: u32,
     pub limits: Limits,
-    pub look: Look,
-    pub view: View,
-}
-
-impl Default for Wanted {
-    fn default() -> Self {
-        Self {
-            scene: None,
-            reloads: 0,
-            settings: None,
-            moving: false,
-            restarts: 0,
-            paused: false,
-            steps: 0,
-            limits: Limits::default(),
-            look: Look { exposure: None, tonemap: Default::default() },
-            view: View::default(),
-        }
-    }
+    pub painting: Painting,
 }
 
 /// What the render thread is doing.
@@ -104,8 +88,17 @@ pub enum Phase {
 pub struct Opened {
     /// With the settings that it was opened with.
     pub source: Source,
+    /// The settings as their file has them.
+    pub read: Settings,
     /// As the file has it, before settings.
     pub loaded: Loaded,
+}
+
+impl Opened {
+    /// Least and greatest corner of the scene as its file has it, metres.
+    pub fn bounds(&self) -> [Vec3; 2] {
+        self.loaded.scene.bounds()
+    }
 }
 
 /// One iteration, for the plots.
@@ -139,6 +132,14 @@ pub struct History {
     pub against_reference: Vec<Measured>,
 }
 
+/// A picture to compare with.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    /// For people.
+    pub name: String,
+    pub picture: Picture,
+}
+
 /// What to write, and where.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Save {
@@ -160,8 +161,10 @@ pub enum Message {
 struct Board {
     wanted: Wanted,
     saves: Vec<Save>,
-    reference: Option<Arc<Film>>,
+    reference: Option<Arc<Reference>>,
     quit: bool,
+    /// Changes with every restart.
+    estimate: u64,
     phase: Phase,
     device: String,
     opened: Option<Arc<Opened>>,
@@ -207,6 +210,7 @@ pub struct Now {
     pub frame: Option<Arc<Frame>>,
     /// The newest picture of it.
     pub painted: Option<Arc<Painted>>,
+    pub reference: Option<Arc<Reference>>,
 }
 
 /// The interface's end.
@@ -244,7 +248,7 @@ impl Engine {
     }
 
     /// What errors are measured against, and pictures compared with.
-    pub fn set_reference(&self, reference: Option<Arc<Film>>) {
+    pub fn set_reference(&self, reference: Option<Arc<Reference>>) {
         let mut board = self.shared.board();
         board.history.against_reference.clear();
         board.reference = reference;
@@ -260,12 +264,19 @@ impl Engine {
             opened: board.opened.clone(),
             frame: board.frame.clone(),
             painted: board.painted.clone(),
+            reference: board.reference.clone(),
         }
     }
 
     /// Reads the history.
     pub fn history<T>(&self, read: impl FnOnce(&History) -> T) -> T {
         read(&self.shared.board().history)
+    }
+
+    /// What other threads say things with.
+    pub fn speaker(&self) -> impl Fn(Message) + Send + 'static {
+        let shared = Arc::clone(&self.shared);
+        move |message| shared.update(|board| board.messages.push(message))
     }
 
     /// What has been said since.

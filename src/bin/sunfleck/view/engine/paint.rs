@@ -7,6 +7,7 @@ use std::sync::Arc;
 use anyhow::Result;
 use sunfleck::inspect::{self, FirstHits};
 use sunfleck::layout::Photon;
+use sunfleck::output::Picture;
 use sunfleck::output::compare::compare;
 use sunfleck::output::convergence::Halves;
 use sunfleck::output::difference::{self, Measure};
@@ -14,7 +15,6 @@ use sunfleck::output::display::{self, Look};
 use sunfleck::output::false_colour::{self, Scale};
 use sunfleck::output::flip::{self, flip};
 use sunfleck::output::histogram::Histogram;
-use sunfleck::output::Picture;
 
 use super::{Board, Frame, Measured, Reference, Shared};
 
@@ -140,6 +140,13 @@ pub struct Painting {
     pub photons: Option<inspect::ColorBy>,
 }
 
+impl Painting {
+    /// Whether it is made from an iteration's photons, read back.
+    pub fn looks_inside(&self) -> bool {
+        self.view.needs_photons() || self.photons.is_some()
+    }
+}
+
 /// A picture for the window.
 #[derive(Debug)]
 pub struct Painted {
@@ -188,7 +195,7 @@ pub fn run(shared: &Shared) {
             let Some(frame) = board.frame.clone() else { continue };
             (frame, board.reference.clone(), board.wanted.painting)
         };
-        let mut work = || {
+        let work = || {
             let measured = painter.measure(&frame, reference.as_deref());
             (Arc::new(painter.paint(&frame, reference, painting)), measured)
         };
@@ -336,7 +343,8 @@ impl Painter {
                 true,
             ),
             View::NodesVisited => {
-                let nodes = frame.insides.as_ref().map_or(vec![], |i| i.nodes_visited.iter().map(|&n| n as f32).collect());
+                let nodes =
+                    frame.insides.as_ref().map_or(vec![], |i| i.nodes_visited.iter().map(|&n| n as f32).collect());
                 scalar(nodes, false)
             }
             View::Radius => {
@@ -354,7 +362,9 @@ impl Painter {
                 && (of.params.size, of.params.crop) == (frame.params.size, frame.params.crop)
         };
         let kept = self.hits.take().filter(|(of, _)| same(of));
-        let (_, hits) = self.hits.insert(kept.unwrap_or_else(|| (Arc::clone(frame), FirstHits::trace(&frame.scene, &frame.view()))));
+        let (_, hits) = self
+            .hits
+            .insert(kept.unwrap_or_else(|| (Arc::clone(frame), FirstHits::trace(&frame.scene, &frame.view()))));
         hits
     }
 }

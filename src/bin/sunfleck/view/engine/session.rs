@@ -4,11 +4,13 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
+use sunfleck::inspect::{self, Split};
 use sunfleck::layout::Camera;
+use sunfleck::output::Picture;
 use sunfleck::ppm::{self, Error, Film, Params, Stages};
 use sunfleck::scene::PackedScene;
 
-use super::{Opened, Record, Wanted};
+use super::{Insides, Opened, Record, Wanted};
 use crate::devices::Device;
 use crate::job::Input;
 
@@ -16,6 +18,8 @@ use crate::job::Input;
 const PREVIEW: u32 = 4;
 /// Photon paths of a preview.
 const PREVIEW_PATHS: u32 = 20_000;
+/// A dispatch's, so that the window's frames find their place between them.
+const DISPATCH_SECONDS: f64 = 0.01;
 /// Between films that are read back.
 const SHOW_EVERY: Duration = Duration::from_millis(80);
 /// Iterations that are shown at once.
@@ -32,11 +36,34 @@ pub struct Frame {
     pub params: Params,
     pub camera: Camera,
     pub scene: Arc<PackedScene>,
+    /// `[h·w]`, metres.
+    pub first_radii: Arc<Vec<f32>>,
+    /// Read back only where something shown needs it.
+    pub insides: Option<Arc<Insides>>,
     /// Median of the first radii and of those now, metres.
     pub first_radius: f32,
     pub radius: f32,
     /// Since the restart, pauses left out.
     pub seconds: f64,
+}
+
+impl Frame {
+    /// The film as a picture.
+    pub fn picture(&self) -> Picture {
+        Picture { size: self.params.size, crop: self.params.crop, rgb: self.film.rgb(), variance: None }
+    }
+
+    /// The camera as a pinhole, and the film behind it.
+    pub fn view(&self) -> inspect::View {
+        inspect::View::new(self.camera, self.params.size, self.params.crop)
+    }
+}
+
+/// What was shown last.
+struct Shown {
+    when: Instant,
+    n_iterations: u32,
+    insides: bool,
 }
 
 /// See the module.
@@ -48,18 +75,19 @@ pub struct Session {
     estimate: u64,
     params: Params,
     is_preview: bool,
-    radii: Vec<f32>,
+    radii: Arc<Vec<f32>>,
+    split: Split,
     first_radius: f32,
     /// Done in this estimate.
     pub n_iterations: u32,
     pub seconds: f64,
-    shown: Option<(Instant, u32)>,
+    shown: Option<Shown>,
 }
 
 impl Session {
     pub fn new(device: &Device, opened: Arc<Opened>, input: Input) -> Result<Self> {
         let scene = Arc::new(PackedScene::new(&input.scene));
-        let stages = device.stages(Arc::clone(&scene), &input)?;
+        let stages = device.stages_of(Arc::clone(&scene), &input, Some(DISPATCH_SECONDS))?;
         let params = input.params.clone();
         Ok(Self {
             opened,
@@ -69,7 +97,8 @@ impl Session {
             estimate: 0,
             params,
             is_preview: false,
-            radii: vec![],
+            radii: Arc::default(),
+            split: Split::default(),
             first_radius: 0.0,
             n_iterations: 0,
             seconds: 0.0,
@@ -90,7 +119,8 @@ impl Session {
         self.stages.set_camera(self.input.camera.pack(width, height), self.params.film_size())?;
         (self.estimate, self.is_preview) = (estimate, is_preview);
         (self.n_iterations, self.seconds, self.shown) = (0, 0.0, None);
-        self.radii = ppm::start(&mut *self.stages, &self.params)?;
+        self.split = Split::default();
+        self.radii = Arc::new(ppm::start(&mut *self.stages, &self.params)?);
         let mut radii: Vec<f32> = self.radii.iter().copied().filter(|r| *r > 0.0 && r.is_finite()).collect();
         let middle = radii.len() / 2;
         self.first_radius =
@@ -130,17 +160,26 @@ impl Session {
         }))
     }
 
-    /// The film, if it is time to show it, or if there will be no more.
-    pub fn frame_if_due(&mut self, is_last: bool) -> Result<Option<Frame>, Error> {
-        let is_new = self.n_iterations > self.shown.map_or(0, |s| s.1);
+    /// Whether something wanted is not in what was shown last.
+    pub fn owes(&self, look_inside: bool) -> bool {
+        self.n_iterations > 0
+            && self.shown.as_ref().is_none_or(|s| s.n_iterations < self.n_iterations || look_inside && !s.insides)
+    }
+
+    /// The film, if it is time to show it, or if there will be no more; with its insides, if `look_inside`.
+    pub fn frame_if_due(&mut self, is_last: bool, look_inside: bool) -> Result<Option<Frame>, Error> {
         let is_due = is_last
             || self.n_iterations <= SHOW_FIRST
-            || self.shown.is_none_or(|(when, _)| when.elapsed() >= SHOW_EVERY);
-        if !is_new || !is_due {
+            || self.shown.as_ref().is_none_or(|shown| shown.when.elapsed() >= SHOW_EVERY);
+        if !is_due || !self.owes(look_inside) {
             return Ok(None);
         }
-        self.shown = Some((Instant::now(), self.n_iterations));
-        self.frame().map(Some)
+        let mut frame = self.frame()?;
+        if look_inside {
+            frame.insides = Some(Arc::new(self.insides()?));
+        }
+        self.shown = Some(Shown { when: Instant::now(), n_iterations: self.n_iterations, insides: look_inside });
+        Ok(Some(frame))
     }
 
     /// The film as it is.
@@ -152,10 +191,22 @@ impl Session {
             params: self.params.clone(),
             camera: self.stages.camera(),
             scene: Arc::clone(&self.scene),
+            first_radii: Arc::clone(&self.radii),
+            insides: None,
             first_radius: self.first_radius,
             radius: self.first_radius * ppm::RadiusSchedule::new(self.params.alpha).scale(self.n_iterations.max(1)),
             seconds: self.seconds,
         })
+    }
+
+    /// Of the last iteration; its light is added to the mean of those looked into before.
+    fn insides(&mut self) -> Result<Insides, Error> {
+        let frame = self.params.frame(self.n_iterations);
+        let (vertices, photons) = (self.stages.eye_vertices()?, self.stages.photons()?);
+        let iteration = inspect::Iteration::new(&self.scene, &frame, &vertices, &self.radii, &photons);
+        self.split.add(&iteration.split());
+        let nodes_visited = iteration.nodes_visited();
+        Ok(Insides { split: self.split.clone(), nodes_visited, photons })
     }
 
     /// Whether a limit is reached.

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 
 use anyhow::{Context, Result};
-use sunfleck::output::{self, Picture};
+use sunfleck::output;
 use sunfleck::scene::settings::Settings;
 
 use super::session::{Frame, Session};
 use super::{Choice, Message, Opened, Phase, Save, Shared, Wanted};
-use crate::devices::Device;
 use crate::cli::{InputArgs, Usage};
+use crate::devices::Device;
 use crate::job;
 use crate::scenes::Source;
 
@@ -41,7 +41,10 @@ pub fn run(shared: &Arc<Shared>, device: &Device) {
     loop {
         let (wanted, saves) = {
             let mut board = shared.wait_until(|board| {
-                !board.saves.is_empty() || have.is_behind(&board.wanted) || have.can_go_on(&board.wanted, board.noise())
+                !board.saves.is_empty()
+                    || have.is_behind(&board.wanted)
+                    || have.can_go_on(&board.wanted, board.noise())
+                    || have.should_show(&board.wanted)
             });
             if board.quit {
                 break;
@@ -92,6 +95,11 @@ impl Have {
         }
     }
 
+    /// Whether there is nothing to do but to show what there is.
+    fn should_show(&self, wanted: &Wanted) -> bool {
+        self.session.as_ref().is_some_and(|session| session.owes(wanted.painting.looks_inside()))
+    }
+
     /// Does one thing that leads towards what is wanted.
     fn follow(&mut self, shared: &Shared, device: &Device, wanted: &Wanted) -> Result<()> {
         let is_other_scene = (&self.wanted.scene, self.wanted.reloads) != (&wanted.scene, wanted.reloads);
@@ -118,35 +126,36 @@ impl Have {
             };
         }
         let noise = shared.board().noise();
-        if self.can_go_on(wanted, noise) {
-            self.iterate(shared, wanted)?;
+        match self.can_go_on(wanted, noise) {
+            true => self.iterate(shared, wanted),
+            false => self.show(shared, wanted, true),
         }
-        Ok(())
     }
 
     /// Applies the settings, as far as possible to the scene that the device has.
     fn prepare(&mut self, shared: &Shared, device: &Device, wanted: &Wanted) -> Result<()> {
         let Some(opened) = self.opened.clone() else { return Ok(()) };
-        let settings = wanted.settings.as_deref().unwrap_or(&opened.source.settings);
-        let input = job::prepare(&opened.source, settings, opened.loaded.clone(), &InputArgs::default())?;
+        let settings = wanted.settings.as_deref().unwrap_or(&opened.source.settings).clone();
+        let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
         let is_same_scene = |session: &Session| {
             Arc::ptr_eq(&session.opened, &opened)
-                && self.settings_used.as_ref().is_some_and(|used| of_scene(used) == of_scene(settings))
+                && self.settings_used.as_ref().is_some_and(|used| of_scene(used) == of_scene(&settings))
         };
         match self.session.as_mut().filter(|session| is_same_scene(session)) {
             Some(session) => session.input = input,
             None => {
                 shared.update(|board| board.phase = Phase::Preparing);
                 self.session = None; // Its memory first.
+                let warnings: Vec<_> = input.warnings.iter().cloned().map(Message::Warning).collect();
                 let session = Session::new(device, opened, input)?;
-                shared.update(|board| board.device = session.device());
+                shared.update(|board| {
+                    board.messages.extend(warnings);
+                    board.device = session.device();
+                });
                 self.session = Some(session);
             }
         }
-        shared.update(|board| {
-            board.messages.extend(input.warnings.iter().cloned().map(Message::Warning));
-        });
-        self.settings_used = Some(settings.clone());
+        self.settings_used = Some(settings);
         self.restart(shared, wanted)
     }
 
@@ -156,6 +165,7 @@ impl Have {
         self.steps_done = wanted.steps;
         shared.update(|board| {
             board.phase = Phase::Starting;
+            board.estimate = self.estimate;
             board.history = Default::default();
         });
         session.restart(self.estimate, wanted.moving)?;
@@ -182,15 +192,20 @@ impl Have {
             self.steps_done = (self.steps_done + 1).min(wanted.steps);
         }
         let noise = shared.board().noise();
-        let (is_done, is_paused) = (session.is_done(wanted, noise), wanted.paused && self.steps_done >= wanted.steps);
-        let frame = session.frame_if_due(is_done || is_paused)?;
+        shared.update(|board| board.history.records.push(record));
+        self.show(shared, wanted, !self.can_go_on(wanted, noise))
+    }
+
+    /// Publishes the film now and then; at once if it `is_last` for a while.
+    fn show(&mut self, shared: &Shared, wanted: &Wanted, is_last: bool) -> Result<()> {
+        let Some(session) = &mut self.session else { return Ok(()) };
+        let frame = session.frame_if_due(is_last, wanted.painting.looks_inside())?;
         shared.update(|board| {
-            board.history.records.push(record);
             if let Some(frame) = frame {
                 board.frame = Some(Arc::new(frame));
             }
-            if is_done || is_paused {
-                board.phase = if is_done { Phase::Reached } else { Phase::Paused };
+            if is_last {
+                board.phase = if wanted.paused { Phase::Paused } else { Phase::Reached };
             }
         });
         Ok(())
@@ -230,12 +245,13 @@ impl Have {
 /// Reads a scene and the settings that lie beside it.
 fn open(choice: &Choice) -> Result<Opened> {
     let mut source = Source::resolve(&choice.name)?;
+    let read = source.settings.clone();
     for pair in &choice.set {
         source.settings.set(pair).map_err(|e| Usage(format!("--set {pair}: {e}")))?;
     }
     source.locate();
     let loaded = source.scene()?;
-    Ok(Opened { source, loaded })
+    Ok(Opened { source, read, loaded })
 }
 
 /// Those settings that the estimate depends on.
@@ -265,7 +281,7 @@ fn of_scene(settings: &Settings) -> Settings {
 
 fn write(save: &Save, frame: &Frame, scene: String, adapter: String) -> Result<u32> {
     let (film, params) = (&frame.film, &frame.params);
-    let picture = Picture { size: params.size, crop: params.crop, rgb: film.rgb(), variance: None };
+    let picture = frame.picture();
     if is_png(&save.path) {
         output::png::write(&save.path, &picture, &save.look)?;
     } else {
