@@ -57,7 +57,7 @@ impl<'a> Iteration<'a> {
         Self { scene, frame, vertices, first_radii, photons, tree }
     }
 
-    /// Gathers again, each kind of photon by itself: about as long as the CPU's gather, or twice that.
+    /// Gathers again, each kind of photon by itself, on all threads; some two and a half times the work of the CPU's gather.
     pub fn split(&self) -> Split {
         Split { n_iterations: 1, pixels: self.each(|vertex, radius| self.parts(vertex, radius)) }
     }
@@ -89,6 +89,7 @@ impl<'a> Iteration<'a> {
     }
 
     /// Nodes of the tree over the photons that each pixel's search enters, `[h·w]`; 0 where nothing is gathered.
+    /// As much work as [`Iteration::split`].
     pub fn nodes_visited(&self) -> Vec<u32> {
         let tree = CountedPointBvh::new(&self.tree);
         self.each(|vertex, radius| {

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::Error;
-use crate::index::{MAX_K, NearestLists, PointBvh, Radii, RadiusSearch};
+use crate::index::{MAX_K, NearestLists, PointBvh, PointOrder, Radii, RadiusSearch};
 
 /// Size of a coordinate, at most: its square and sums of squares stay finite.
 pub const MAX_COORDINATE: f64 = 1e100;
@@ -61,7 +61,7 @@ impl Cloud {
 /// along each axis. Stray points, as long as they are fewer than half, cost the others no precision, however far off. With
 /// the scale a cloud gives the same answers in millimetres and in kilometres, and squared distances between the points
 /// about the origin neither overflow nor vanish. What lies more than 10¹⁸ off is moved there: far from the rest, but no
-/// longer told apart. The tree's grid spans stray points too: from some 10⁶ off on, searches are exact but slow.
+/// longer told apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
     origin: DVec3,
@@ -118,7 +118,8 @@ impl<'a> Indexed<'a> {
     pub fn new(positions: &'a [DVec3]) -> Result<Self, Error> {
         check(positions)?;
         let frame = Frame::of(positions);
-        let tree = PointBvh::new(&frame.locals(positions))?;
+        // Its boxes follow the points: a stray one far off does not widen those of the others.
+        let tree = PointBvh::with_order(&frame.locals(positions), PointOrder::Median)?;
         Ok(Self { positions, frame, tree })
     }
 

@@ -1,5 +1,6 @@
 //! Scene files, valid and hostile, written here from code.
 
+mod changes;
 mod environment;
 mod gltf_hostile;
 mod gltf_valid;

@@ -282,3 +282,39 @@ fn available_memory() -> u64 {
     let allowed = group("memory.max").map_or(u64::MAX, |max| max.saturating_sub(group("memory.current").unwrap_or(0)));
     free.min(allowed)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sunfleck::scene::settings::{Count, Size};
+
+    /// As a window needs it: the file is read once, the settings change.
+    #[test]
+    fn a_scene_is_prepared_again_with_other_settings() {
+        let source = Source::resolve("cornell").unwrap();
+        let loaded = source.scene().unwrap();
+        let args = InputArgs::default();
+        let first = prepare(&source, &source.settings, loaded.clone(), &args).unwrap();
+        let mut settings = source.settings.clone();
+        settings.size = Some(Size([32, 16]));
+        settings.photons = Some(Count(77));
+        settings.camera = Some((&first.camera).into());
+        settings.material_mut(&loaded.scene, 0).roughness = Some(0.125);
+        let second = prepare(&source, &settings, loaded.clone(), &args).unwrap();
+        assert_eq!((second.params.size, second.params.n_paths), ([32, 16], 77));
+        assert_eq!(second.scene.materials[0].roughness, 0.125);
+        let position = |input: &Input| input.camera.world_from_camera.translation;
+        assert_eq!(position(&first), position(&second));
+        // Back again, and the command line over all.
+        let args = InputArgs { photons: Some(5), ..InputArgs::default() };
+        let third = prepare(&source, &source.settings, loaded, &args).unwrap();
+        assert_eq!((third.params.size, third.params.n_paths), (first.params.size, 5));
+        assert_eq!(third.scene.materials[0].roughness, first.scene.materials[0].roughness);
+        settings.set("material.none.ior=2").unwrap();
+        let error = prepare(&source, &settings, source.scene().unwrap(), &args).err().map(|e| crate::chain(&e));
+        assert!(
+            error.as_ref().is_some_and(|e| e.contains("cornell: material[1].name: there is no material")),
+            "{error:?}"
+        );
+    }
+}

@@ -93,7 +93,7 @@ impl GpuStages {
         method: Method,
     ) -> Result<Self, Error> {
         let guard = Arc::clone(&context);
-        Ok(guard.guarded(|| Self::make(context, scene, camera, method))?)
+        guard.guarded(|| Self::make(context, scene, camera, method))
     }
 
     fn make(context: Arc<Context>, scene: &PackedScene, camera: Camera, method: Method) -> Result<Self, device::Error> {
@@ -227,7 +227,7 @@ impl Stages for GpuStages {
 
     fn set_camera(&mut self, camera: Camera, film_size: [u32; 2]) -> Result<(), Error> {
         self.camera = camera;
-        self.scene.set_camera(&self.context, &camera);
+        self.scene.set_camera(&self.context, &camera)?;
         self.reserve_pixels(film_size[0] * film_size[1])?;
         // Nothing of the old film is to be read.
         self.n_pixels = 0;

@@ -86,8 +86,11 @@ impl SceneBuffers {
     }
 
     /// Of the dispatches submitted from now on.
-    pub(super) fn set_camera(&self, context: &Context, camera: &Camera) {
-        context.queue.write_buffer(&self.camera, 0, bytemuck::bytes_of(camera));
+    pub(super) fn set_camera(&self, context: &Context, camera: &Camera) -> Result<(), Error> {
+        context.guarded(|| {
+            context.queue.write_buffer(&self.camera, 0, bytemuck::bytes_of(camera));
+            Ok(())
+        })
     }
 }
 
