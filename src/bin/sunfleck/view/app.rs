@@ -1,6 +1,6 @@
 //! The window: its state, and what is where in it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{Result, bail};
@@ -60,6 +60,7 @@ pub struct Viewer {
     messages: Vec<(f64, Message)>,
     pub show_help: bool,
     pub dialog: Option<files::Dialog>,
+    pub pick: files::Pick,
     wake: Wake,
     /// The scene that `edits` belongs to.
     editing: Option<Arc<Opened>>,
@@ -81,6 +82,7 @@ impl Viewer {
             messages: vec![],
             show_help: false,
             dialog: None,
+            pick: Arc::new(files::pick),
             wake,
             editing: None,
         }
@@ -174,12 +176,8 @@ impl Viewer {
     /// What renders this picture on the command line.
     pub fn command(&self) -> Option<String> {
         let opened = self.editing.as_ref()?;
-        let iterations = self.now.frame.as_ref().map_or(1, |frame| frame.film.n_iterations.max(1));
-        let mut command = format!("sunfleck render {}", crate::render::quote(&opened.source.name));
-        for pair in self.edits.now().difference(&opened.read) {
-            command += &format!(" --set {}", crate::render::quote(&pair));
-        }
-        Some(format!("{command} --iterations {iterations} -o picture.exr"))
+        let iterations = self.now.frame.as_ref().map_or(1, |frame| frame.film.n_iterations);
+        Some(opened.command(self.edits.now(), iterations, Path::new("picture.exr")))
     }
 
     /// What is open.

@@ -1,7 +1,7 @@
 //! Files: dialogs, dropped files, the clipboard.
 
 use std::path::{Path, PathBuf};
-use std::sync::mpsc;
+use std::sync::{Arc, mpsc};
 
 use eframe::egui;
 
@@ -17,6 +17,9 @@ pub enum Purpose {
     Reference,
 }
 
+/// Asks for a file.
+pub type Pick = Arc<dyn Fn(Purpose, &str) -> Option<PathBuf> + Send + Sync>;
+
 /// A dialog under way, on a thread of its own.
 pub struct Dialog {
     purpose: Purpose,
@@ -24,6 +27,25 @@ pub struct Dialog {
 }
 
 const SCENES: &[&str] = &["glb", "gltf", "obj", "toml"];
+
+/// The system's dialog, for a file that is best called `name`; waits for the answer.
+pub fn pick(purpose: Purpose, name: &str) -> Option<PathBuf> {
+    let dialog = rfd::FileDialog::new();
+    match purpose {
+        Purpose::Open => dialog.set_title("Open a scene").add_filter("Scenes and settings", SCENES).pick_file(),
+        Purpose::SavePicture => dialog
+            .set_title("Save the picture")
+            .set_file_name(format!("{name}.exr"))
+            .add_filter("OpenEXR, PNG", &["exr", "png"])
+            .save_file(),
+        Purpose::SaveSettings => dialog
+            .set_title("Save the settings")
+            .set_file_name(format!("{name}.toml"))
+            .add_filter("Settings", &["toml"])
+            .save_file(),
+        Purpose::Reference => dialog.set_title("Open a reference").add_filter("OpenEXR", &["exr"]).pick_file(),
+    }
+}
 
 fn ask(viewer: &mut Viewer, purpose: Purpose) {
     if viewer.dialog.is_some() {
@@ -36,23 +58,9 @@ fn ask(viewer: &mut Viewer, purpose: Purpose) {
         .as_ref()
         .map(|choice| Path::new(&choice.name).file_stem().unwrap_or_default().to_string_lossy().into_owned());
     let name = stem.unwrap_or_else(|| "picture".to_owned());
-    let wake = viewer.wake();
+    let (wake, pick) = (viewer.wake(), Arc::clone(&viewer.pick));
     std::thread::spawn(move || {
-        let dialog = rfd::FileDialog::new();
-        let path = match purpose {
-            Purpose::Open => dialog.set_title("Open a scene").add_filter("Scenes and settings", SCENES).pick_file(),
-            Purpose::SavePicture => dialog
-                .set_title("Save the picture")
-                .set_file_name(format!("{name}.exr"))
-                .add_filter("OpenEXR, PNG", &["exr", "png"])
-                .save_file(),
-            Purpose::SaveSettings => dialog
-                .set_title("Save the settings")
-                .set_file_name(format!("{name}.toml"))
-                .add_filter("Settings", &["toml"])
-                .save_file(),
-            Purpose::Reference => dialog.set_title("Open a reference").add_filter("OpenEXR", &["exr"]).pick_file(),
-        };
+        let path = pick(purpose, &name);
         let _ = sender.send(path);
         wake();
     });

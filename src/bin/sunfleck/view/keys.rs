@@ -2,6 +2,8 @@
 
 use eframe::egui;
 use egui::{Key, KeyboardShortcut, Modifiers};
+use sunfleck::ppm::Params;
+use sunfleck::scene::settings::Count;
 
 use super::app::Viewer;
 use super::files;
@@ -51,6 +53,8 @@ pub const SHORTCUTS: &[Shortcut] = &[
     key(Key::Space, "restart", |_, v| v.restart()),
     key(Key::P, "pause, go on", |_, v| v.wanted.paused = !v.wanted.paused),
     key(Key::N, "one iteration, then pause", |_, v| v.step()),
+    key(Key::Plus, "twice the photons an iteration", |ui, v| scale_photons(ui, v, 2.0)),
+    key(Key::Minus, "half the photons an iteration", |ui, v| scale_photons(ui, v, 0.5)),
     key(Key::F, "frame all", |ui, v| v.frame_all(ui.input(|i| i.time))),
     key(Key::Num1, "picture as large as the window", |_, v| v.picture.fit()),
     key(Key::Num2, "one pixel to a point", |_, v| v.picture.zoom = Some(1.0)),
@@ -62,9 +66,16 @@ pub const SHORTCUTS: &[Shortcut] = &[
     key(Key::Escape, "close the help", |_, v| v.show_help = false),
 ];
 
+fn scale_photons(ui: &egui::Ui, viewer: &mut Viewer, factor: f64) {
+    viewer.edit(ui, "photons", |settings| {
+        let now = settings.photons.map_or(Params::new(1, 1).n_paths, |n| n.0);
+        settings.photons = Some(Count((factor * f64::from(now)).max(1.0) as u32));
+    });
+}
+
 /// Does what was asked for by keys, unless they are typed into a field.
 pub fn handle(ui: &mut egui::Ui, viewer: &mut Viewer) {
-    let flying = ui.input(|i| i.pointer.secondary_down());
+    let flying = ui.input(|i| i.pointer.secondary_down()) || viewer.picture.flying;
     if ui.ctx().egui_wants_keyboard_input() || flying {
         return;
     }

@@ -16,6 +16,8 @@ mod picture;
 mod settings;
 mod start;
 mod state;
+#[cfg(test)]
+mod tests;
 
 use std::process::ExitCode;
 use std::sync::Arc;

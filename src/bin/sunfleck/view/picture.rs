@@ -36,6 +36,8 @@ pub struct PictureView {
     rig: Option<(Arc<Settings>, Rig)>,
     /// When the camera last moved.
     moved: Option<f64>,
+    /// Whether keys move the camera.
+    pub flying: bool,
     /// Pixel under the cursor.
     pub hovered: Option<[usize; 2]>,
     /// Where the picture is, points.
@@ -208,7 +210,9 @@ fn move_camera(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, response: &egui::
         }
     }
     let typing = ui.ctx().egui_wants_keyboard_input();
-    let direction = if typing { Vec3::ZERO } else { ui.input(flight) };
+    let was_flying = viewer.picture.flying;
+    let direction = if typing { Vec3::ZERO } else { ui.input(|i| flight(i, was_flying)) };
+    viewer.picture.flying = direction != Vec3::ZERO;
     if direction != Vec3::ZERO {
         let (pace, seconds) = ui.input(|i| {
             let pace = if i.modifiers.shift {
@@ -234,13 +238,16 @@ fn move_camera(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, response: &egui::
     }
 }
 
-/// x to the right, y up, z forward.
-fn flight(input: &egui::InputState) -> Vec3 {
-    if input.modifiers.alt || input.modifiers.command && !input.modifiers.ctrl {
+/// x to the right, y up, z forward. Keys with Ctrl are shortcuts, and E alone is one, unless the camera flies already.
+fn flight(input: &egui::InputState, flying: bool) -> Vec3 {
+    let axis = |plus: Key, minus: Key| f32::from(input.key_down(plus)) - f32::from(input.key_down(minus));
+    let level = Vec3::new(axis(Key::D, Key::A), 0.0, axis(Key::W, Key::S));
+    let looking = input.pointer.secondary_down();
+    if input.modifiers.alt || input.modifiers.command && !(flying || looking) {
         return Vec3::ZERO;
     }
-    let axis = |plus: Key, minus: Key| f32::from(input.key_down(plus)) - f32::from(input.key_down(minus));
-    Vec3::new(axis(Key::D, Key::A), axis(Key::E, Key::Q), axis(Key::W, Key::S))
+    let rises = flying || looking || level != Vec3::ZERO;
+    level + if rises { axis(Key::E, Key::Q) * Vec3::Y } else { Vec3::ZERO }
 }
 
 impl Viewer {

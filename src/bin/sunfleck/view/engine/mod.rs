@@ -8,7 +8,7 @@ mod paint;
 mod session;
 mod worker;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
@@ -98,6 +98,16 @@ impl Opened {
     /// Least and greatest corner of the scene as its file has it, metres.
     pub fn bounds(&self) -> [Vec3; 2] {
         self.loaded.scene.bounds()
+    }
+
+    /// What renders this scene with `settings` on the command line.
+    pub fn command(&self, settings: &Settings, iterations: u32, output: &Path) -> String {
+        let mut command = format!("sunfleck render {}", crate::render::quote(&self.source.name));
+        for pair in settings.difference(&self.read) {
+            command += &format!(" --set {}", crate::render::quote(&pair));
+        }
+        let output = crate::render::quote(&output.to_string_lossy());
+        format!("{command} --iterations {} -o {output}", iterations.max(1))
     }
 }
 

@@ -9,6 +9,7 @@ use sunfleck::layout::Camera;
 use sunfleck::output::Picture;
 use sunfleck::ppm::{self, Error, Film, Params, Stages};
 use sunfleck::scene::PackedScene;
+use sunfleck::scene::settings::Settings;
 
 use super::{Insides, Opened, Record, Wanted};
 use crate::devices::Device;
@@ -36,6 +37,9 @@ pub struct Frame {
     pub params: Params,
     pub camera: Camera,
     pub scene: Arc<PackedScene>,
+    /// What it is an estimate of.
+    pub opened: Arc<Opened>,
+    pub settings: Arc<Settings>,
     /// `[h·w]`, metres.
     pub first_radii: Arc<Vec<f32>>,
     /// Read back only where something shown needs it.
@@ -70,6 +74,8 @@ struct Shown {
 pub struct Session {
     pub opened: Arc<Opened>,
     pub input: Input,
+    /// What `input` was made with.
+    pub settings: Arc<Settings>,
     scene: Arc<PackedScene>,
     stages: Box<dyn Stages>,
     estimate: u64,
@@ -85,13 +91,14 @@ pub struct Session {
 }
 
 impl Session {
-    pub fn new(device: &Device, opened: Arc<Opened>, input: Input) -> Result<Self> {
+    pub fn new(device: &Device, opened: Arc<Opened>, settings: Arc<Settings>, input: Input) -> Result<Self> {
         let scene = Arc::new(PackedScene::new(&input.scene));
         let stages = device.stages_of(Arc::clone(&scene), &input, Some(DISPATCH_SECONDS))?;
         let params = input.params.clone();
         Ok(Self {
             opened,
             input,
+            settings,
             scene,
             stages,
             estimate: 0,
@@ -191,6 +198,8 @@ impl Session {
             params: self.params.clone(),
             camera: self.stages.camera(),
             scene: Arc::clone(&self.scene),
+            opened: Arc::clone(&self.opened),
+            settings: Arc::clone(&self.settings),
             first_radii: Arc::clone(&self.radii),
             insides: None,
             first_radius: self.first_radius,

@@ -20,8 +20,6 @@ struct Have {
     wanted: Wanted,
     session: Option<Session>,
     opened: Option<Arc<Opened>>,
-    /// What `session` was made with.
-    settings_used: Option<Settings>,
     estimate: u64,
     steps_done: u32,
     writers: Vec<JoinHandle<()>>,
@@ -29,15 +27,8 @@ struct Have {
 
 /// Until the interface is gone.
 pub fn run(shared: &Arc<Shared>, device: &Device) {
-    let mut have = Have {
-        wanted: Wanted::default(),
-        session: None,
-        opened: None,
-        settings_used: None,
-        estimate: 0,
-        steps_done: 0,
-        writers: vec![],
-    };
+    let mut have =
+        Have { wanted: Wanted::default(), session: None, opened: None, estimate: 0, steps_done: 0, writers: vec![] };
     loop {
         let (wanted, saves) = {
             let mut board = shared.wait_until(|board| {
@@ -138,16 +129,15 @@ impl Have {
         let settings = wanted.settings.as_deref().unwrap_or(&opened.source.settings).clone();
         let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
         let is_same_scene = |session: &Session| {
-            Arc::ptr_eq(&session.opened, &opened)
-                && self.settings_used.as_ref().is_some_and(|used| of_scene(used) == of_scene(&settings))
+            Arc::ptr_eq(&session.opened, &opened) && of_scene(&session.settings) == of_scene(&settings)
         };
         match self.session.as_mut().filter(|session| is_same_scene(session)) {
-            Some(session) => session.input = input,
+            Some(session) => (session.input, session.settings) = (input, Arc::new(settings)),
             None => {
                 shared.update(|board| board.phase = Phase::Preparing);
                 self.session = None; // Its memory first.
                 let warnings: Vec<_> = input.warnings.iter().cloned().map(Message::Warning).collect();
-                let session = Session::new(device, opened, input)?;
+                let session = Session::new(device, opened, Arc::new(settings), input)?;
                 shared.update(|board| {
                     board.messages.extend(warnings);
                     board.device = session.device();
@@ -155,7 +145,6 @@ impl Have {
                 self.session = Some(session);
             }
         }
-        self.settings_used = Some(settings);
         self.restart(shared, wanted)
     }
 
@@ -228,11 +217,10 @@ impl Have {
             Some(Ok(frame)) => Some(Arc::new(frame)),
             _ => shared.board().frame.clone(),
         };
-        let name = self.opened.as_ref().map_or(String::new(), |opened| opened.source.name.clone());
         let (device, shared) = (shared.board().device.clone(), Arc::clone(shared));
         self.writers.retain(|writer| !writer.is_finished());
         self.writers.push(std::thread::spawn(move || {
-            let written = frame.context("there is no picture yet").and_then(|frame| write(&save, &frame, name, device));
+            let written = frame.context("there is no picture yet").and_then(|frame| write(&save, &frame, device));
             let message = match written {
                 Ok(n) => Message::Said(format!("saved {} after {n} iterations", save.path.display())),
                 Err(error) => Message::Error(crate::one_line(&crate::chain(&error))),
@@ -279,15 +267,15 @@ fn of_scene(settings: &Settings) -> Settings {
     }
 }
 
-fn write(save: &Save, frame: &Frame, scene: String, adapter: String) -> Result<u32> {
+fn write(save: &Save, frame: &Frame, adapter: String) -> Result<u32> {
     let (film, params) = (&frame.film, &frame.params);
     let picture = frame.picture();
     if is_png(&save.path) {
         output::png::write(&save.path, &picture, &save.look)?;
     } else {
         let header = output::exr::Header {
-            scene,
-            command: crate::render::command_line(),
+            scene: frame.opened.source.name.clone(),
+            command: frame.opened.command(&frame.settings, film.n_iterations, &save.path),
             adapter,
             seed: params.seed,
             alpha: params.alpha,

@@ -1,0 +1,1 @@
+//! Panels, menus, messages, dropped files.
