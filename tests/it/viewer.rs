@@ -23,6 +23,7 @@ const PROGRAM: &str = env!("CARGO_BIN_EXE_sunfleck");
 const PATIENCE: Duration = Duration::from_secs(120);
 
 const CONTROL: u32 = 0xffe3;
+const LEFT: u8 = 1;
 
 /// Ends with the test, however that ends.
 struct Process(Child);
@@ -77,15 +78,8 @@ impl Display {
         codes.iter().rev().for_each(|&code| self.fake(KEY_RELEASE_EVENT, code, [0, 0]));
     }
 
-    fn drag(&self, from: [i16; 2], to: [i16; 2]) {
-        const LEFT: u8 = 1;
-        self.fake(MOTION_NOTIFY_EVENT, 0, from);
-        self.fake(BUTTON_PRESS_EVENT, LEFT, from);
-        for step in 1..=10 {
-            let at = [0, 1].map(|i| from[i] + (to[i] - from[i]) * step / 10);
-            self.fake(MOTION_NOTIFY_EVENT, 0, at);
-        }
-        self.fake(BUTTON_RELEASE_EVENT, LEFT, to);
+    fn point(&self, x: i16, y: i16) {
+        self.fake(MOTION_NOTIFY_EVENT, 0, [x, y]);
     }
 
     /// The window of the program, and what it is called.
@@ -161,7 +155,16 @@ fn a_picture_saved_in_the_window_is_what_its_command_renders() {
         (focus == window).then_some(())
     };
     wait_for("focus", &mut viewer, || focused(window));
-    display.drag([640, 360], [700, 380]);
+    // Orbits, back and forth until the picture is another one.
+    display.point(640, 360);
+    display.fake(BUTTON_PRESS_EVENT, LEFT, [0, 0]);
+    let mut steps = 0;
+    wait_for("orbit", &mut viewer, || {
+        steps += 1;
+        display.point(640 + steps % 100, 360);
+        display.window().filter(|(_, now)| *now != title).map(|_| ())
+    });
+    display.fake(BUTTON_RELEASE_EVENT, LEFT, [0, 0]);
     display.press(&[u32::from(b'-')]);
     // Both restart the estimate; a picture that is saved too early is saved again.
     let command = wait_for("picture with all changes", &mut viewer, || {

@@ -28,7 +28,8 @@ struct NoPixels;
 
 impl TestRenderer for NoPixels {
     fn handle_delta(&mut self, delta: &mut egui::TexturesDelta) {
-        *delta = egui::TexturesDelta::default();
+        delta.set.clear();
+        delta.free.clear();
     }
 
     fn render(&mut self, _: &egui::Context, _: &egui::FullOutput) -> Result<image::RgbaImage, String> {
