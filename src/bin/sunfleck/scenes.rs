@@ -117,7 +117,8 @@ pub fn list() -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn describe(name: &str) -> &'static str {
+/// A shipped scene in one line.
+pub fn describe(name: &str) -> &'static str {
     match name {
         "cornell" => "the box with a red and a green wall, a mirror ball and a glass ball",
         "glass" => "a goblet of red wine and marbles under a small lamp",

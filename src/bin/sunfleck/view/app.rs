@@ -61,6 +61,9 @@ pub struct Viewer {
     pub show_help: bool,
     pub dialog: Option<files::Dialog>,
     pub pick: files::Pick,
+    /// Index of the material of what was clicked on.
+    pub selected: Option<usize>,
+    pub start: super::start::Page,
     wake: Wake,
     /// The scene that `edits` belongs to.
     editing: Option<Arc<Opened>>,
@@ -83,6 +86,8 @@ impl Viewer {
             show_help: false,
             dialog: None,
             pick: Arc::new(files::pick),
+            selected: None,
+            start: Default::default(),
             wake,
             editing: None,
         }
@@ -110,7 +115,11 @@ impl Viewer {
 
     /// Changes the settings; `what` names what is edited, for undo.
     pub fn edit(&mut self, ui: &egui::Ui, what: &'static str, change: impl FnOnce(&mut Settings)) {
-        self.edit_at(ui.input(|i| i.time), what, change);
+        let (time, is_dragging) = ui.input(|i| (i.time, i.pointer.is_decidedly_dragging()));
+        self.edit_at(time, what, change);
+        if is_dragging {
+            self.picture.move_on(time);
+        }
     }
 
     /// The same at a time in seconds.
@@ -235,6 +244,9 @@ impl Viewer {
             Some(_) => super::picture::show(ui, self),
             None => super::start::show(ui, self),
         });
+        if self.wanted.scene.is_some() {
+            super::start::drop_hint(ui);
+        }
         super::help::show(ui, self);
         self.show_messages(ui);
         self.engine.want(&self.wanted);
@@ -258,6 +270,7 @@ impl Viewer {
                     self.edits = Edits::new(opened.source.settings.clone());
                     self.wanted.painting.look.exposure = opened.source.settings.exposure;
                     self.picture = PictureView::default();
+                    self.selected = None;
                 }
             }
         }

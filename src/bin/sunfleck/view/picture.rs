@@ -42,6 +42,8 @@ pub struct PictureView {
     pub hovered: Option<[usize; 2]>,
     /// Where the picture is, points.
     pub rect: Option<Rect>,
+    /// The room that there is for it, points.
+    pub area: Option<Rect>,
 }
 
 impl PictureView {
@@ -53,6 +55,11 @@ impl PictureView {
     /// The whole picture in the window.
     pub fn fit(&mut self) {
         (self.zoom, self.offset) = (None, Vec2::ZERO);
+    }
+
+    /// Something moves, at `time`, seconds: previews until it rests.
+    pub fn move_on(&mut self, time: f64) {
+        self.moved = Some(time);
     }
 
     fn take(&mut self, ctx: &egui::Context, painted: &Arc<Painted>) {
@@ -78,6 +85,7 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
     let (area, response) = ui.allocate_exact_size(ui.available_size(), egui::Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Picture"));
     ui.painter().rect_filled(area, 0.0, egui::Color32::from_gray(24));
+    viewer.picture.area = Some(area);
     if let Some(painted) = viewer.now.painted.clone() {
         viewer.picture.take(ui.ctx(), &painted);
     }
@@ -283,6 +291,7 @@ impl Viewer {
         if let Some((of, _)) = &mut self.picture.rig {
             *of = Arc::clone(self.edits.now());
         }
+        self.picture.move_on(time);
     }
 
     /// Of the picture that is wanted, pixels.

@@ -50,6 +50,11 @@ impl Edits {
         self.now = Arc::new(settings);
     }
 
+    /// The next edit is a step of its own, whatever it is of.
+    pub fn end_step(&mut self) {
+        self.last = None;
+    }
+
     pub fn can_undo(&self) -> bool {
         !self.undo.is_empty()
     }

@@ -226,6 +226,8 @@ pub struct Now {
 /// The interface's end.
 pub struct Engine {
     shared: Arc<Shared>,
+    /// What searches the photons: `tree` or `hardware`.
+    index: String,
     threads: Vec<JoinHandle<()>>,
 }
 
@@ -233,13 +235,19 @@ impl Engine {
     /// Starts the threads; `wake` is called from them.
     pub fn start(device: Device, wake: Wake) -> std::io::Result<Self> {
         let shared = Arc::new(Shared { board: Mutex::default(), changed: Condvar::new(), wake });
+        let index = device.index();
         let named = |name: &str| std::thread::Builder::new().name(name.to_owned());
         let (render, paint) = (Arc::clone(&shared), Arc::clone(&shared));
         let threads = vec![
             named("render").spawn(move || worker::run(&render, &device))?,
             named("paint").spawn(move || paint::run(&paint))?,
         ];
-        Ok(Self { shared, threads })
+        Ok(Self { shared, index, threads })
+    }
+
+    /// What searches the photons: `tree` or `hardware`.
+    pub fn index(&self) -> &str {
+        &self.index
     }
 
     /// Says what is wanted from now on.

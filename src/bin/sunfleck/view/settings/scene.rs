@@ -1,0 +1,406 @@
+//! What is lit, and by what: environment, the selected material, lights.
+
+use eframe::egui;
+use egui::Ui;
+use glam::Vec3;
+use sunfleck::scene::defaults::has_light;
+use sunfleck::scene::settings::{EnvironmentSettings, MaterialSettings, SceneLightSettings, Settings};
+use sunfleck::scene::{Material, PunctualKind, PunctualLight, Scene};
+
+use super::widgets::{Name, row, slider};
+use crate::view::app::Viewer;
+
+const SOURCE: Name = Name { name: "Source", hint: "Where the light from infinitely far away comes from." };
+const ROTATION: Name = Name {
+    name: "Rotation",
+    hint: "Turns the environment about the y axis, counter-clockwise seen from above, degrees. Restarts the estimate.",
+};
+const STRENGTH: Name = Name { name: "Strength", hint: "Factor on the environment's light. Restarts the estimate." };
+const COLOR: Name = Name { name: "Colour", hint: "Radiance all around, linear RGB. Restarts the estimate." };
+const SCALE: Name = Name {
+    name: "Light scale",
+    hint: "Factor on every light: lamps, glowing surfaces, environment. Restarts the estimate.",
+};
+const MATERIAL: Name = Name { name: "Material", hint: "Click on an object in the picture, or choose here." };
+const BASE_COLOR: Name =
+    Name { name: "Base colour", hint: "Linear RGB; a texture multiplies it. Restarts the estimate." };
+const ROUGHNESS: Name =
+    Name { name: "Roughness", hint: "From 0, a mirror, to 1; a texture multiplies it. Restarts the estimate." };
+const METALLIC: Name = Name {
+    name: "Metallic",
+    hint: "From 0, paint, plastic or glass, to 1, metal; a texture multiplies it. Restarts the estimate.",
+};
+const TRANSMISSION: Name = Name {
+    name: "Transmission",
+    hint: "Share of the light that enters and is let through, as in glass, from 0 to 1. Restarts the estimate.",
+};
+const IOR: Name = Name {
+    name: "Refraction",
+    hint: "Index of refraction: water 1.33, glass 1.5, diamond 2.4. Restarts the estimate.",
+};
+const EMISSION: Name =
+    Name { name: "Emission", hint: "Factor on the light that the surface gives by itself. Restarts the estimate." };
+
+/// What shines from all around.
+enum Sky {
+    File(String),
+    Color([f32; 3]),
+    Own { rotation: f32, strength: f32 },
+    Default,
+    None,
+}
+
+impl Sky {
+    fn new(settings: &Settings, scene: &Scene) -> Self {
+        let given = settings.environment.clone().unwrap_or_default();
+        match (given.file, given.color, &scene.environment) {
+            (Some(file), ..) => Self::File(file),
+            (None, Some(color), _) => Self::Color(color),
+            (None, None, Some(own)) => Self::Own { rotation: own.rotation.to_degrees(), strength: own.strength },
+            (None, None, None) if has_light(scene) || !settings.lights.is_empty() => Self::None,
+            (None, None, None) => Self::Default,
+        }
+    }
+}
+
+pub fn environment(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
+    let Some(opened) = viewer.opened().cloned() else { return };
+    let now = viewer.settings();
+    let sky = Sky::new(&now, &opened.loaded.scene);
+    let was = read.environment.clone().unwrap_or_default();
+    let given = now.environment.clone().unwrap_or_default();
+    let is_other = (&given.file, given.color.is_some()) != (&was.file, was.color.is_some());
+    let reset = row(ui, SOURCE, is_other, |ui| {
+        let text = match &sky {
+            Sky::File(file) => file,
+            Sky::Color(_) => "one colour",
+            Sky::Own { .. } => "the scene's own",
+            Sky::Default => "a soft sky, as nothing else gives light",
+            Sky::None => "none",
+        };
+        ui.add(egui::Label::new(text).truncate())
+    });
+    if reset {
+        viewer.reset(ui, |s| s.environment = read.environment.clone());
+        return;
+    }
+    if matches!(sky, Sky::None) {
+        let hint = "The same light from everywhere. Restarts the estimate.";
+        if ui.button("Add one colour all around").on_hover_text(hint).clicked() {
+            let grey = EnvironmentSettings { color: Some([0.5; 3]), ..EnvironmentSettings::default() };
+            viewer.edit(ui, "environment", |s| s.environment = Some(grey));
+        }
+        return;
+    }
+    if let Sky::Color(mut color) = sky {
+        let mut changed = false;
+        let reset = row(ui, COLOR, was.color.is_some() && given.color != was.color, |ui| {
+            let response = ui.color_edit_button_rgb(&mut color);
+            changed = response.changed();
+            response
+        });
+        if changed || reset {
+            let color = if reset { was.color } else { Some(color) };
+            edit_sky(ui, viewer, "environment colour", read, |sky| sky.color = color);
+        }
+    }
+    let (rotation, strength) = match sky {
+        Sky::Own { rotation, strength } => (rotation, strength),
+        _ => (0.0, 1.0),
+    };
+    let rows = [
+        (ROTATION, given.rotation_degrees, was.rotation_degrees, rotation),
+        (STRENGTH, given.strength, was.strength, strength),
+    ];
+    for (i, (name, value, old, default)) in rows.into_iter().enumerate() {
+        let mut shown = f64::from(value.unwrap_or(default));
+        let mut changed = false;
+        let reset = row(ui, name, value != old, |ui| {
+            let range = if i == 0 { -180.0..=180.0 } else { 0.0..=100.0 };
+            let response = slider(ui, &mut shown, range, |slider| match i {
+                0 => slider.max_decimals(1).suffix("°"),
+                _ => logarithmic(slider),
+            });
+            changed = response.changed();
+            response
+        });
+        if changed || reset {
+            let value = if reset { old } else { Some(shown as f32) };
+            edit_sky(ui, viewer, name.name, read, |sky| match i {
+                0 => sky.rotation_degrees = value,
+                _ => sky.strength = value.map(|v| v.max(0.0)),
+            });
+        }
+    }
+}
+
+/// Nothing is left where nothing is said.
+fn edit_sky(
+    ui: &Ui,
+    viewer: &mut Viewer,
+    what: &'static str,
+    read: &Settings,
+    change: impl FnOnce(&mut EnvironmentSettings),
+) {
+    viewer.edit(ui, what, |s| {
+        let mut sky = s.environment.take().unwrap_or_default();
+        change(&mut sky);
+        let is_empty = sky == EnvironmentSettings::default() && read.environment.is_none();
+        s.environment = (!is_empty).then_some(sky);
+    });
+}
+
+fn logarithmic(slider: egui::Slider<'_>) -> egui::Slider<'_> {
+    slider.logarithmic(true).smallest_positive(0.01).max_decimals(3)
+}
+
+pub fn lights(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
+    let Some(opened) = viewer.opened().cloned() else { return };
+    let scene = &opened.loaded.scene;
+    let now = viewer.settings();
+    let mut scale = f64::from(now.light_scale.unwrap_or(1.0));
+    let mut changed = false;
+    let reset = row(ui, SCALE, now.light_scale != read.light_scale, |ui| {
+        let response = slider(ui, &mut scale, 0.0..=100.0, logarithmic);
+        changed = response.changed();
+        response
+    });
+    if changed {
+        viewer.edit(ui, "light scale", |s| s.light_scale = Some((scale as f32).max(0.0)));
+    }
+    if reset {
+        viewer.reset(ui, |s| s.light_scale = read.light_scale);
+    }
+    if scene.lights.is_empty() {
+        ui.weak("The scene has no point, spot or directional lights.");
+        return;
+    }
+    let height = ui.spacing().interact_size.y;
+    let area = egui::ScrollArea::vertical().id_salt("lights").max_height(12.0 * height);
+    area.show_rows(ui, height, scene.lights.len(), |ui, range| {
+        for i in range {
+            light(ui, viewer, read, scene, i);
+        }
+    });
+}
+
+/// One line: on, colour, strength.
+fn light(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, i: usize) {
+    let light = &scene.lights[i];
+    let was = read.clone().scene_light_mut(scene, i).clone();
+    let mut now = viewer.settings().as_ref().clone().scene_light_mut(scene, i).clone();
+    let before = now.clone();
+    let mut reset = false;
+    ui.push_id(i, |ui| {
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            let mut on = now.on != Some(false);
+            let name = if light.name.is_empty() { format!("light {i}") } else { light.name.clone() };
+            let width = (ui.available_width() - 140.0).max(40.0);
+            let height = ui.spacing().interact_size.y;
+            ui.allocate_ui_with_layout(
+                egui::vec2(width, height),
+                egui::Layout::left_to_right(egui::Align::Center),
+                |ui| {
+                    ui.set_min_width(width);
+                    ui.set_max_width(width);
+                    let hint = format!("{name}, {}: whether it shines. Restarts the estimate.", kind(light));
+                    if ui.add(egui::Checkbox::new(&mut on, egui::RichText::new(&name))).on_hover_text(hint).changed() {
+                        now.on = Some(on);
+                    }
+                },
+            );
+            let mut color = now.color.unwrap_or_else(|| hue(light.intensity));
+            let hint = "Its colour, linear RGB; it stays as bright. Restarts the estimate.";
+            if ui.color_edit_button_rgb(&mut color).on_hover_text(hint).changed() && color != [0.0; 3] {
+                now.color = Some(color);
+            }
+            let mut strength = now.strength.unwrap_or(1.0);
+            let speed = 0.01 * strength.max(0.1);
+            let drag = egui::DragValue::new(&mut strength).speed(speed).range(0.0..=1e6).max_decimals(3).prefix("× ");
+            let hint =
+                format!("Factor on its {:.4} {}. Restarts the estimate.", light.intensity.max_element(), unit(light));
+            if ui.add_sized(egui::vec2(62.0, height), drag.update_while_editing(false)).on_hover_text(hint).changed() {
+                now.strength = Some(strength);
+            }
+            if before != was {
+                let button = egui::Button::new("⟲").frame(false);
+                reset = ui.add(button).on_hover_text("Back to what the file says").clicked();
+            }
+        });
+    });
+    if reset {
+        viewer.reset(ui, |s| {
+            *s.scene_light_mut(scene, i) = was;
+            tidy(s, read);
+        });
+    } else if now != before {
+        viewer.edit(ui, "light", |s| *s.scene_light_mut(scene, i) = now);
+    }
+}
+
+fn kind(light: &PunctualLight) -> &'static str {
+    match light.kind {
+        PunctualKind::Point => "a point light",
+        PunctualKind::Spot { .. } => "a spot light",
+        PunctualKind::Directional => "a directional light",
+    }
+}
+
+fn unit(light: &PunctualLight) -> &'static str {
+    match light.kind {
+        PunctualKind::Point | PunctualKind::Spot { .. } => "cd",
+        PunctualKind::Directional => "lx",
+    }
+}
+
+/// The colour of light of any strength.
+fn hue(intensity: Vec3) -> [f32; 3] {
+    let most = intensity.max_element();
+    if most > 0.0 { (intensity / most).to_array() } else { [1.0; 3] }
+}
+
+/// Takes away changes that change nothing and that the file does not have.
+fn tidy(settings: &mut Settings, read: &Settings) {
+    settings.materials.retain(|m| {
+        let target = MaterialSettings { name: m.name.clone(), index: m.index, ..MaterialSettings::default() };
+        *m != target || read.materials.contains(m)
+    });
+    settings.scene_lights.retain(|l| {
+        let target = SceneLightSettings { name: l.name.clone(), index: l.index, ..SceneLightSettings::default() };
+        *l != target || read.scene_lights.contains(l)
+    });
+}
+
+pub fn material(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
+    let Some(opened) = viewer.opened().cloned() else { return };
+    let scene = &opened.loaded.scene;
+    let title = |i: usize| match scene.materials.get(i) {
+        Some(material) if !material.name.is_empty() => material.name.clone(),
+        Some(_) => format!("material {i}"),
+        None => "a sphere of the settings file".to_owned(),
+    };
+    let mut picked = None;
+    row(ui, MATERIAL, false, |ui| {
+        let text = viewer.selected.map_or_else(|| "none".to_owned(), title);
+        let combo = egui::ComboBox::from_id_salt("material").width(ui.available_width()).selected_text(text).truncate();
+        let inside = combo.show_ui(ui, |ui| {
+            for i in 0..scene.materials.len() {
+                if ui.selectable_label(viewer.selected == Some(i), title(i)).clicked() {
+                    picked = Some(i);
+                }
+            }
+        });
+        inside.response
+    });
+    viewer.selected = picked.or(viewer.selected);
+    let Some(index) = viewer.selected else {
+        ui.weak("Click on an object in the picture.");
+        return;
+    };
+    match scene.materials.get(index) {
+        Some(material) => properties(ui, viewer, read, scene, index, material),
+        None => {
+            ui.weak("The settings file makes this sphere, with a [[sphere]] that says what it is of.");
+        }
+    }
+}
+
+/// A number of a material: where settings have it, what its file says, its range.
+struct Number {
+    name: Name,
+    field: fn(&mut MaterialSettings) -> &mut Option<f32>,
+    own: f32,
+    range: [f64; 2],
+    is_logarithmic: bool,
+}
+
+fn properties(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, index: usize, own: &Material) {
+    let was = read.clone().material_mut(scene, index).clone();
+    let before = viewer.settings().as_ref().clone().material_mut(scene, index).clone();
+    let mut color = before.base_color.unwrap_or(own.base_color.to_array());
+    let mut changed = false;
+    let reset = row(ui, BASE_COLOR, before.base_color != was.base_color, |ui| {
+        let response = ui.color_edit_button_rgb(&mut color);
+        changed = response.changed();
+        response
+    });
+    if changed {
+        let color = color.map(|c| c.clamp(0.0, 1.0));
+        viewer.edit(ui, "base colour", |s| s.material_mut(scene, index).base_color = Some(color));
+    }
+    if reset {
+        viewer.reset(ui, |s| {
+            s.material_mut(scene, index).base_color = was.base_color;
+            tidy(s, read);
+        });
+    }
+    let unit = |name, field, own| Number { name, field, own, range: [0.0, 1.0], is_logarithmic: false };
+    let numbers = [
+        unit(ROUGHNESS, |m| &mut m.roughness, own.roughness),
+        unit(METALLIC, |m| &mut m.metallic, own.metallic),
+        unit(TRANSMISSION, |m| &mut m.transmission, own.transmission),
+        Number { range: [1.0, 2.5], ..unit(IOR, |m| &mut m.ior, own.ior) },
+        Number { range: [0.0, 1000.0], is_logarithmic: true, ..unit(EMISSION, |m| &mut m.emission_strength, 1.0) },
+    ];
+    let shines = before.emission.map_or(own.emission, Vec3::from) != Vec3::ZERO;
+    for Number { name, field, own, range: [low, high], is_logarithmic } in numbers {
+        if name.name == EMISSION.name && !shines {
+            continue;
+        }
+        let (value, old) = (*field(&mut before.clone()), *field(&mut was.clone()));
+        let mut shown = f64::from(value.unwrap_or(own));
+        let mut changed = false;
+        let reset = row(ui, name, value != old, |ui| {
+            let response = slider(ui, &mut shown, low..=high, |slider| match is_logarithmic {
+                true => logarithmic(slider),
+                false => slider.max_decimals(3),
+            });
+            changed = response.changed();
+            response
+        });
+        if changed {
+            let value = match name.name {
+                "Refraction" => (shown as f32).max(0.01),
+                "Emission" => (shown as f32).max(0.0),
+                _ => (shown as f32).clamp(0.0, 1.0),
+            };
+            viewer.edit(ui, name.name, |s| *field(s.material_mut(scene, index)) = Some(value));
+        }
+        if reset {
+            viewer.reset(ui, |s| {
+                *field(s.material_mut(scene, index)) = old;
+                tidy(s, read);
+            });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_of_nothing_are_tidied_away() {
+        let scene = Scene {
+            materials: vec![Material::diffuse("a", Vec3::ONE), Material::diffuse("b", Vec3::ONE)],
+            ..Scene::default()
+        };
+        let mut read = Settings::default();
+        read.material_mut(&scene, 0);
+        let mut now = read.clone();
+        now.material_mut(&scene, 1).ior = Some(2.0);
+        let changed = now.clone();
+        tidy(&mut now, &read);
+        assert_eq!(now, changed);
+        now.material_mut(&scene, 1).ior = None;
+        tidy(&mut now, &read);
+        assert_eq!(now, read);
+    }
+
+    #[test]
+    fn hues_have_no_strength() {
+        assert_eq!(hue(Vec3::new(4.0, 2.0, 0.0)), [1.0, 0.5, 0.0]);
+        assert_eq!(hue(Vec3::ZERO), [1.0; 3]);
+    }
+}
