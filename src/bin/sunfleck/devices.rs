@@ -123,6 +123,31 @@ impl Device {
         }
     }
 
+    /// Whether it has failed for good.
+    #[cfg(feature = "view")]
+    pub fn is_lost(&self) -> bool {
+        match self {
+            Self::Cpu => false,
+            Self::Gpu(context, _) => context.check().is_err(),
+        }
+    }
+
+    /// The same adapter, opened once more.
+    #[cfg(feature = "view")]
+    pub fn reopen(&self) -> Result<Self> {
+        Ok(match self {
+            Self::Cpu => Self::Cpu,
+            Self::Gpu(context, method) => {
+                let choice = Choice::Index(context.info().index);
+                let context = match method {
+                    Method::Tree => Context::new(&choice)?,
+                    Method::Hardware => Context::with_ray_queries(&choice)?,
+                };
+                Self::Gpu(Arc::new(context), *method)
+            }
+        })
+    }
+
     /// What the adapter is called, if this is one.
     pub fn gpu_name(&self) -> Option<String> {
         match self {

@@ -65,8 +65,6 @@ pub struct Viewer {
     pub show_help: bool,
     pub dialog: Option<files::Dialog>,
     pub pick: files::Pick,
-    /// Index of the material of what was clicked on.
-    pub selected: Option<usize>,
     pub start: super::start::Page,
     wake: Wake,
     /// The scene that `edits` belongs to.
@@ -87,7 +85,6 @@ impl Viewer {
             picture: PictureView::default(),
             inspect: Default::default(),
             compare: Default::default(),
-            selected: None,
             output: first.output,
             messages: vec![],
             show_help: false,
@@ -278,7 +275,6 @@ impl Viewer {
                     self.edits = Edits::new(opened.source.settings.clone());
                     self.wanted.painting.look.exposure = opened.source.settings.exposure;
                     self.picture = PictureView::default();
-                    self.selected = None;
                 }
             }
         }

@@ -4,10 +4,13 @@
 //! The render thread compares what is wanted with what it has and does the least that leads there. What was wanted in
 //! between is never rendered, so that no queue of camera positions can build up.
 
+mod history;
 mod paint;
+mod painting;
 mod session;
 mod worker;
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -15,10 +18,10 @@ use std::thread::JoinHandle;
 use glam::Vec3;
 use sunfleck::output::Picture;
 use sunfleck::output::display::Look;
-use sunfleck::ppm::StageTimes;
 use sunfleck::scene::load::Loaded;
 use sunfleck::scene::settings::Settings;
 
+pub use history::{History, Measured, OfIteration, Record, Series};
 pub use paint::{Comparison, Insides, Legend, Painted, Painting, Values, View};
 pub use session::Frame;
 
@@ -61,6 +64,8 @@ pub struct Wanted {
     pub paused: bool,
     /// Iterations to do though paused: grows by one a step.
     pub steps: u32,
+    /// Counts requests to do again what failed, with the device opened anew if it was lost.
+    pub retries: u32,
     pub limits: Limits,
     pub painting: Painting,
 }
@@ -111,37 +116,6 @@ impl Opened {
     }
 }
 
-/// One iteration, for the plots.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Record {
-    /// From 1.
-    pub iteration: u32,
-    /// Since the restart, pauses left out.
-    pub seconds: f64,
-    /// Median over the pixels, metres.
-    pub radius: f32,
-    pub times: StageTimes,
-    pub n_photons: u32,
-    pub n_paths: u32,
-}
-
-/// An error of a picture, after so many iterations.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Measured {
-    pub iteration: u32,
-    pub rel_mse: f64,
-}
-
-/// All of an estimate's iterations.
-#[derive(Clone, Debug, Default)]
-pub struct History {
-    pub records: Vec<Record>,
-    /// From the two halves of the iterations.
-    pub estimated: Vec<Measured>,
-    /// Against the reference.
-    pub against_reference: Vec<Measured>,
-}
-
 /// A picture to compare with.
 #[derive(Clone, Debug)]
 pub struct Reference {
@@ -172,6 +146,8 @@ struct Board {
     wanted: Wanted,
     saves: Vec<Save>,
     reference: Option<Arc<Reference>>,
+    /// Of a picture that the window can show, pixels.
+    most_side: Option<usize>,
     quit: bool,
     /// Changes with every restart.
     estimate: u64,
@@ -204,11 +180,32 @@ impl Shared {
         result
     }
 
+    /// Says what is being done, if that is news.
+    fn enter(&self, phase: Phase) {
+        if self.board().phase != phase {
+            self.update(|board| board.phase = phase);
+        }
+    }
+
+    /// Notes what nobody needs to look at by itself.
+    fn note<T>(&self, change: impl FnOnce(&mut Board) -> T) -> T {
+        change(&mut self.board())
+    }
+
     /// Waits until something changes, unless `ready` already.
     fn wait_until(&self, mut ready: impl FnMut(&mut Board) -> bool) -> MutexGuard<'_, Board> {
         let guard = self.board();
         self.changed.wait_while(guard, |board| !board.quit && !ready(board)).unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// Does `work`; a panic in it becomes an error, one line.
+fn catch<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    // What `work` may have left half done is thrown away by those who call this.
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
+        let text = panic.downcast_ref::<&str>().map(ToString::to_string).or(panic.downcast_ref::<String>().cloned());
+        crate::one_line(&format!("a bug in sunfleck: {}", text.unwrap_or_else(|| "panic".to_owned())))
+    })
 }
 
 /// What can be seen at a moment.
@@ -239,8 +236,8 @@ impl Engine {
         let named = |name: &str| std::thread::Builder::new().name(name.to_owned());
         let (render, paint) = (Arc::clone(&shared), Arc::clone(&shared));
         let threads = vec![
-            named("render").spawn(move || worker::run(&render, &device))?,
-            named("paint").spawn(move || paint::run(&paint))?,
+            named("render").spawn(move || worker::run(&render, device))?,
+            named("paint").spawn(move || painting::run(&paint))?,
         ];
         Ok(Self { shared, index, threads })
     }
@@ -263,6 +260,11 @@ impl Engine {
     pub fn save(&self, save: Save) {
         self.shared.board().saves.push(save);
         self.shared.changed.notify_all();
+    }
+
+    /// Larger pictures are shown reduced, pixels a side.
+    pub fn set_most_side(&self, most_side: usize) {
+        self.shared.board().most_side = Some(most_side);
     }
 
     /// What errors are measured against, and pictures compared with.

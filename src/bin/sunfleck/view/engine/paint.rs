@@ -1,10 +1,9 @@
-//! The paint thread: from the newest film to what the window shows.
-//!
-//! It has threads of its own, or a slow iteration would keep a change of exposure waiting.
+//! From a film to what the window shows.
 
 use std::sync::Arc;
 
 use anyhow::Result;
+use rayon::prelude::*;
 use sunfleck::inspect::{self, FirstHits};
 use sunfleck::layout::Photon;
 use sunfleck::output::Picture;
@@ -16,7 +15,7 @@ use sunfleck::output::false_colour::{self, Scale};
 use sunfleck::output::flip::{self, flip};
 use sunfleck::output::histogram::Histogram;
 
-use super::{Board, Frame, Measured, Reference, Shared};
+use super::{Frame, Reference};
 
 /// What is shown of a render.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -170,9 +169,41 @@ pub struct Painted {
     pub figures: Option<Difference>,
     /// Why what was wanted could not be painted.
     pub problem: Option<String>,
+    /// In the place of what is too large for a texture.
+    pub reduced: Option<Reduced>,
+}
+
+/// A picture with fewer pixels, for a window whose textures are small.
+#[derive(Debug)]
+pub struct Reduced {
+    pub size: [usize; 2],
+    pub rgba: Vec<u8>,
+    /// The reference, as small.
+    pub reference: Option<Vec<u8>>,
 }
 
 impl Painted {
+    /// What fits into a texture: size, and bytes as in `rgba`.
+    pub fn texture(&self) -> ([usize; 2], &[u8]) {
+        self.reduced.as_ref().map_or((self.size, &self.rgba), |reduced| (reduced.size, &reduced.rgba))
+    }
+
+    /// The same of the reference, whose size is the picture's.
+    pub fn reference_texture(&self) -> Option<([usize; 2], &[u8])> {
+        let (_, rgba) = self.reference.as_ref()?;
+        match &self.reduced {
+            Some(reduced) => Some((reduced.size, reduced.reference.as_deref()?)),
+            None => Some((self.size, rgba)),
+        }
+    }
+
+    pub fn reduce(&mut self, most_side: Option<usize>) {
+        let Some(most) = most_side.filter(|&most| self.size.iter().any(|&side| side > most)) else { return };
+        let (size, rgba) = reduced(self.size, &self.rgba, most);
+        let reference = self.reference.as_ref().map(|(_, rgba)| reduced(self.size, rgba, most).1);
+        self.reduced = Some(Reduced { size, rgba, reference });
+    }
+
     /// Of a pixel: red, green and blue, or one number.
     pub fn value(&self, x: usize, y: usize) -> Vec<f32> {
         let i = y * self.size[0] + x;
@@ -183,69 +214,8 @@ impl Painted {
     }
 }
 
-/// Until the interface is gone.
-pub fn run(shared: &Shared) {
-    let n_threads = (rayon::current_num_threads() / 2).max(1);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build();
-    let mut painter = Painter::default();
-    loop {
-        let (frame, reference, painting) = {
-            let board = shared.wait_until(|board| board.frame.as_ref().is_some_and(|frame| !is_painted(board, frame)));
-            if board.quit {
-                break;
-            }
-            let Some(frame) = board.frame.clone() else { continue };
-            (frame, board.reference.clone(), board.wanted.painting)
-        };
-        let mut work = || {
-            let (estimated, figures) = painter.measure(&frame, reference.as_deref());
-            let painted = painter.paint(&frame, reference.clone(), painting);
-            (Arc::new(Painted { figures, ..painted }), estimated)
-        };
-        // Without a pool of its own it takes the common one.
-        let (painted, estimated) = match &pool {
-            Ok(pool) => pool.install(work),
-            Err(_) => work(),
-        };
-        shared.update(|board| {
-            let measured = painted.figures.map(|figures| figures.rel_mse);
-            let is_same_reference = same(reference.as_ref(), board.reference.as_ref());
-            board.painted = Some(painted);
-            if frame.estimate == board.estimate && !frame.is_preview {
-                push(&mut board.history.estimated, frame.film.n_iterations, estimated);
-                if is_same_reference {
-                    push(&mut board.history.against_reference, frame.film.n_iterations, measured);
-                }
-            }
-        });
-    }
-}
-
-fn push(list: &mut Vec<Measured>, iteration: u32, rel_mse: Option<f64>) {
-    if let Some(rel_mse) = rel_mse
-        && list.last().is_none_or(|last| last.iteration < iteration)
-    {
-        list.push(Measured { iteration, rel_mse });
-    }
-}
-
-fn is_painted(board: &Board, frame: &Arc<Frame>) -> bool {
-    board.painted.as_ref().is_some_and(|painted| {
-        Arc::ptr_eq(&painted.frame, frame)
-            && painted.painting == board.wanted.painting
-            && same(painted.reference.as_ref().map(|r| &r.0), fitting(board.reference.as_ref(), frame))
-    })
-}
-
-fn same(a: Option<&Arc<Reference>>, b: Option<&Arc<Reference>>) -> bool {
-    match (a, b) {
-        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
-        (a, b) => a.is_none() && b.is_none(),
-    }
-}
-
 /// The reference, if it has the picture's size.
-fn fitting<'a>(reference: Option<&'a Arc<Reference>>, frame: &Frame) -> Option<&'a Arc<Reference>> {
+pub fn fitting<'a>(reference: Option<&'a Arc<Reference>>, frame: &Frame) -> Option<&'a Arc<Reference>> {
     reference.filter(|r| (r.picture.size, r.picture.crop) == (frame.params.size, frame.params.crop))
 }
 
@@ -254,7 +224,7 @@ const STOPS: [f32; 2] = [-8.0, 8.0];
 
 /// What is kept from frame to frame.
 #[derive(Default)]
-struct Painter {
+pub struct Painter {
     halves: (u64, Halves),
     hits: Option<(Arc<Frame>, FirstHits)>,
 }
@@ -268,8 +238,14 @@ struct Colours {
 }
 
 impl Painter {
+    pub fn is_empty(&self) -> bool {
+        self.hits.is_none() && self.halves.1 == Halves::default()
+    }
+
     /// Error estimated from the halves, and measured against the reference.
-    fn measure(&mut self, frame: &Frame, reference: Option<&Reference>) -> (Option<f64>, Option<Difference>) {
+    pub fn measure(&mut self, frame: &Frame, reference: Option<&Reference>) -> (Option<f64>, Option<Difference>) {
+        // What another scene left would keep that scene in memory.
+        self.hits = self.hits.take().filter(|(of, _)| Arc::ptr_eq(&of.scene, &frame.scene));
         if frame.is_preview {
             return (None, None);
         }
@@ -281,7 +257,7 @@ impl Painter {
         (self.halves.1.rel_mse(), measured)
     }
 
-    fn paint(&mut self, frame: &Arc<Frame>, reference: Option<Arc<Reference>>, painting: Painting) -> Painted {
+    pub fn paint(&mut self, frame: &Arc<Frame>, reference: Option<Arc<Reference>>, painting: Painting) -> Painted {
         let picture = frame.picture();
         let exposure = painting.look.exposure_of(&picture.rgb);
         let tonemap = painting.look.tonemap;
@@ -327,6 +303,7 @@ impl Painter {
             mean: colours.mean,
             figures: None,
             problem,
+            reduced: None,
         }
     }
 
@@ -389,6 +366,26 @@ impl Painter {
             .insert(kept.unwrap_or_else(|| (Arc::clone(frame), FirstHits::trace(&frame.scene, &frame.view()))));
         hits
     }
+}
+
+/// Means of squares of pixels, so many that no side is longer than `most` pixels.
+fn reduced(size: [usize; 2], rgba: &[u8], most: usize) -> ([usize; 2], Vec<u8>) {
+    let factor = size[0].max(size[1]).div_ceil(most.max(1)).max(1);
+    let small = size.map(|side| side.div_ceil(factor));
+    let mut bytes = vec![0; 4 * small[0] * small[1]];
+    bytes.par_chunks_exact_mut(4).enumerate().for_each(|(i, to)| {
+        let [x0, y0] = [factor * (i % small[0]), factor * (i / small[0])];
+        let (mut sum, mut n) = ([0u32; 4], 0);
+        for y in y0..(y0 + factor).min(size[1]) {
+            for x in x0..(x0 + factor).min(size[0]) {
+                let from = 4 * (y * size[0] + x);
+                sum.iter_mut().zip(&rgba[from..from + 4]).for_each(|(sum, &c)| *sum += u32::from(c));
+                n += 1;
+            }
+        }
+        to.iter_mut().zip(sum).for_each(|(to, sum)| *to = ((sum + n / 2) / n.max(1)) as u8);
+    });
+    (small, bytes)
 }
 
 /// Nothing if no comparison is wanted that is painted here.

@@ -9,7 +9,7 @@ use sunfleck::output;
 use sunfleck::scene::settings::Settings;
 
 use super::session::{Frame, Session};
-use super::{Choice, Message, Opened, Phase, Save, Shared, Wanted};
+use super::{Board, Choice, Message, Opened, Phase, Save, Shared, Wanted, catch};
 use crate::cli::{InputArgs, Usage};
 use crate::devices::Device;
 use crate::job;
@@ -26,7 +26,7 @@ struct Have {
 }
 
 /// Until the interface is gone.
-pub fn run(shared: &Arc<Shared>, device: &Device) {
+pub fn run(shared: &Arc<Shared>, mut device: Device) {
     let mut have =
         Have { wanted: Wanted::default(), session: None, opened: None, estimate: 0, steps_done: 0, writers: vec![] };
     loop {
@@ -36,17 +36,19 @@ pub fn run(shared: &Arc<Shared>, device: &Device) {
                     || have.is_behind(&board.wanted)
                     || have.can_go_on(&board.wanted, board.noise())
                     || have.should_show(&board.wanted)
+                    || have.should_say(board)
             });
             if board.quit {
                 break;
             }
             (board.wanted.clone(), std::mem::take(&mut board.saves))
         };
-        for save in saves {
-            have.save(shared, save);
-        }
-        if let Err(error) = have.follow(shared, device, &wanted) {
-            have.fail(shared, &error);
+        let done = catch(|| {
+            saves.into_iter().for_each(|save| have.save(shared, save));
+            have.follow(shared, &mut device, &wanted).map_err(|error| crate::one_line(&crate::chain(&error)))
+        });
+        if let Err(error) = done.flatten() {
+            have.fail(shared, error);
         }
     }
     for writer in have.writers {
@@ -54,7 +56,7 @@ pub fn run(shared: &Arc<Shared>, device: &Device) {
     }
 }
 
-impl super::Board {
+impl Board {
     fn noise(&self) -> Option<f64> {
         self.history.estimated.last().map(|measured| measured.rel_mse)
     }
@@ -63,7 +65,9 @@ impl super::Board {
 impl Have {
     /// Whether what is wanted calls for more than going on.
     fn is_behind(&self, wanted: &Wanted) -> bool {
-        (&self.wanted.scene, self.wanted.reloads) != (&wanted.scene, wanted.reloads) || self.is_stale(wanted)
+        (&self.wanted.scene, self.wanted.reloads) != (&wanted.scene, wanted.reloads)
+            || self.wanted.retries != wanted.retries
+            || self.is_stale(wanted)
     }
 
     /// Whether the estimate under way is not the one wanted.
@@ -91,14 +95,28 @@ impl Have {
         self.session.as_ref().is_some_and(|session| session.owes(wanted.painting.looks_inside()))
     }
 
+    /// Whether it rests without having said so: a limit was reached, or a pause asked for, after the last film was shown.
+    fn should_say(&self, board: &Board) -> bool {
+        self.session.is_some() && !self.can_go_on(&board.wanted, board.noise()) && board.phase != resting(&board.wanted)
+    }
+
     /// Does one thing that leads towards what is wanted.
-    fn follow(&mut self, shared: &Shared, device: &Device, wanted: &Wanted) -> Result<()> {
-        let is_other_scene = (&self.wanted.scene, self.wanted.reloads) != (&wanted.scene, wanted.reloads);
+    fn follow(&mut self, shared: &Shared, device: &mut Device, wanted: &Wanted) -> Result<()> {
+        let is_retry = self.wanted.retries != wanted.retries && self.session.is_none() && wanted.scene.is_some();
+        let is_other_scene = (&self.wanted.scene, self.wanted.reloads) != (&wanted.scene, wanted.reloads)
+            || is_retry && self.opened.is_none();
         let is_stale = self.is_stale(wanted);
         let before = std::mem::replace(&mut self.wanted, wanted.clone());
+        if is_retry && device.is_lost() {
+            *device = device.reopen()?;
+        }
         if is_other_scene {
+            // The memory of the old one first.
             (self.session, self.opened) = (None, None);
-            shared.update(|board| (board.opened, board.frame, board.phase) = (None, None, Phase::Loading));
+            shared.update(|board| {
+                (board.opened, board.frame, board.painted) = (None, None, None);
+                board.phase = Phase::Loading;
+            });
             let Some(choice) = &wanted.scene else {
                 shared.update(|board| board.phase = Phase::Empty);
                 return Ok(());
@@ -110,7 +128,7 @@ impl Have {
             });
             return self.prepare(shared, device, wanted);
         }
-        if is_stale {
+        if is_stale || is_retry {
             return match self.rendered(&before) == self.rendered(wanted) && self.session.is_some() {
                 true => self.restart(shared, wanted),
                 false => self.prepare(shared, device, wanted),
@@ -164,7 +182,7 @@ impl Have {
     fn iterate(&mut self, shared: &Shared, wanted: &Wanted) -> Result<()> {
         let Some(session) = &mut self.session else { return Ok(()) };
         let opened = Arc::clone(&session.opened);
-        shared.update(|board| board.phase = Phase::Rendering);
+        shared.enter(Phase::Rendering);
         // The first picture of a preview is always shown, or a camera that keeps moving would show none.
         let keep_on = wanted.moving && session.n_iterations == 0;
         let is_stale = || {
@@ -181,7 +199,7 @@ impl Have {
             self.steps_done = (self.steps_done + 1).min(wanted.steps);
         }
         let noise = shared.board().noise();
-        shared.update(|board| board.history.records.push(record));
+        shared.note(|board| board.history.records.push(record));
         self.show(shared, wanted, !self.can_go_on(wanted, noise))
     }
 
@@ -189,20 +207,17 @@ impl Have {
     fn show(&mut self, shared: &Shared, wanted: &Wanted, is_last: bool) -> Result<()> {
         let Some(session) = &mut self.session else { return Ok(()) };
         let frame = session.frame_if_due(is_last, wanted.painting.looks_inside())?;
-        shared.update(|board| {
-            if let Some(frame) = frame {
-                board.frame = Some(Arc::new(frame));
-            }
-            if is_last {
-                board.phase = if wanted.paused { Phase::Paused } else { Phase::Reached };
-            }
-        });
+        if let Some(frame) = frame {
+            shared.update(|board| board.frame = Some(Arc::new(frame)));
+        }
+        if is_last {
+            shared.enter(resting(wanted));
+        }
         Ok(())
     }
 
     /// The film so far stays on view, and can be saved.
-    fn fail(&mut self, shared: &Shared, error: &anyhow::Error) {
-        let text = crate::one_line(&crate::chain(error));
+    fn fail(&mut self, shared: &Shared, text: String) {
         self.session = None;
         shared.update(|board| {
             board.messages.push(Message::Error(text.clone()));
@@ -228,6 +243,11 @@ impl Have {
             shared.update(|board| board.messages.push(message));
         }));
     }
+}
+
+/// The phase of an estimate that does not go on.
+fn resting(wanted: &Wanted) -> Phase {
+    if wanted.paused { Phase::Paused } else { Phase::Reached }
 }
 
 /// Reads a scene and the settings that lie beside it.
