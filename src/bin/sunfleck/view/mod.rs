@@ -8,6 +8,7 @@ mod camera;
 mod compare;
 mod convergence;
 mod engine;
+mod failure;
 mod files;
 mod help;
 mod inspect;
@@ -16,6 +17,7 @@ mod picture;
 mod settings;
 mod start;
 mod state;
+mod timing;
 
 use std::process::ExitCode;
 use std::sync::Arc;

@@ -106,9 +106,7 @@ impl Have {
 
     /// Whether it rests without having said so: a limit was reached, or a pause asked for, after the last film was shown.
     fn should_say(&self, board: &Board) -> bool {
-        self.session.is_some()
-            && !self.can_go_on(&board.wanted, board.noise())
-            && board.phase != resting(&board.wanted)
+        self.session.is_some() && !self.can_go_on(&board.wanted, board.noise()) && board.phase != resting(&board.wanted)
     }
 
     /// Does one thing that leads towards what is wanted.
