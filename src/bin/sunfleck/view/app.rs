@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Instant;
 
 use anyhow::{Result, bail};
 use eframe::egui;
@@ -60,6 +61,12 @@ pub struct Viewer {
     /// Index into the scene's materials.
     pub selected: Option<usize>,
     pub output: Option<PathBuf>,
+    pub convergence: super::convergence::Convergence,
+    pub timing: super::timing::Timing,
+    /// What was open before.
+    pub previous: Option<Arc<Choice>>,
+    /// Of a texture, pixels.
+    most_side: usize,
     /// With the times they appeared.
     messages: Vec<(f64, Message)>,
     pub show_help: bool,
@@ -86,6 +93,10 @@ impl Viewer {
             inspect: Default::default(),
             compare: Default::default(),
             output: first.output,
+            convergence: Default::default(),
+            timing: Default::default(),
+            previous: None,
+            most_side: 0,
             messages: vec![],
             show_help: false,
             dialog: None,
@@ -99,9 +110,24 @@ impl Viewer {
 
     /// Opens a file, or a shipped scene by its name.
     pub fn open(&mut self, name: impl Into<String>) {
+        if self.editing.is_some() {
+            self.previous = self.wanted.scene.clone();
+        }
         self.wanted.scene = Some(Arc::new(Choice { name: name.into(), set: vec![] }));
         self.wanted.settings = None;
         self.wanted.reloads += 1;
+    }
+
+    /// Opens what was open before.
+    pub fn back(&mut self) {
+        self.wanted.scene = self.previous.take();
+        self.wanted.settings = None;
+        self.wanted.reloads += 1;
+    }
+
+    /// Does again what failed.
+    pub fn retry(&mut self) {
+        self.wanted.retries += 1;
     }
 
     pub fn close_scene(&mut self) {
@@ -224,7 +250,9 @@ impl Viewer {
 
     /// One frame.
     pub fn show(&mut self, ui: &mut egui::Ui) {
+        let began = Instant::now();
         self.look_at_engine(ui);
+        let wanted = self.wanted.clone();
         files::poll(ui, self);
         super::keys::handle(ui, self);
         egui::Panel::top("bar").show(ui, |ui| super::bar::show(ui, self));
@@ -253,11 +281,24 @@ impl Viewer {
         }
         super::help::show(ui, self);
         self.show_messages(ui);
+        let asks = |w: &Wanted| (w.settings.clone(), w.scene.clone(), w.restarts);
+        if asks(&wanted) != asks(&self.wanted) {
+            self.timing.ask(began, self.now.estimate);
+        }
         self.engine.want(&self.wanted);
+        self.timing.frame(began.elapsed());
     }
 
     fn look_at_engine(&mut self, ui: &egui::Ui) {
         self.now = self.engine.now();
+        if let Some(painted) = &self.now.painted {
+            self.timing.see(Instant::now(), painted.frame.estimate);
+        }
+        let most_side = ui.input(|i| i.max_texture_side);
+        if self.most_side != most_side {
+            self.most_side = most_side;
+            self.engine.set_most_side(most_side);
+        }
         let time = ui.input(|i| i.time);
         self.messages.extend(self.engine.take_messages().into_iter().map(|message| (time, message)));
         let same = match (&self.editing, &self.now.opened) {
@@ -269,6 +310,7 @@ impl Viewer {
             self.selected = None;
             let is_reload = self.wanted.settings.is_some() && self.now.opened.is_some();
             self.editing = self.now.opened.clone();
+            self.picture.forget();
             if let Some(opened) = &self.editing {
                 self.remembered.opened(&opened.source.name);
                 if !is_reload {
@@ -325,7 +367,11 @@ impl Viewer {
         if let Some(i) = dismissed {
             self.messages.remove(i);
         }
-        ui.ctx().request_repaint_after_secs(0.5);
+        // Errors stay; nobody need look after them.
+        let passing = self.messages.iter().filter(|(_, message)| !matches!(message, Message::Error(_)));
+        if let Some(end) = passing.map(|(when, _)| when + MESSAGE_SECONDS).reduce(f64::min) {
+            ui.ctx().request_repaint_after_secs((end - now).max(0.0) as f32);
+        }
     }
 }
 

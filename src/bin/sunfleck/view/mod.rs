@@ -8,6 +8,7 @@ mod camera;
 mod compare;
 mod convergence;
 mod engine;
+mod failure;
 mod files;
 mod help;
 mod inspect;
@@ -18,6 +19,7 @@ mod start;
 mod state;
 #[cfg(test)]
 mod tests;
+mod timing;
 
 use std::process::ExitCode;
 use std::sync::Arc;

@@ -63,11 +63,17 @@ impl PictureView {
         self.moved = Some(time);
     }
 
+    /// The picture of a scene that goes: it would keep the scene in memory.
+    pub fn forget(&mut self) {
+        (self.texture, self.painted, self.hovered) = (None, None, None);
+    }
+
     fn take(&mut self, ctx: &egui::Context, painted: &Arc<Painted>) {
         if self.painted.as_ref().is_some_and(|now| Arc::ptr_eq(now, painted)) {
             return;
         }
-        let image = egui::ColorImage::from_rgba_unmultiplied(painted.size, &painted.rgba);
+        let (size, rgba) = painted.texture();
+        let image = egui::ColorImage::from_rgba_unmultiplied(size, rgba);
         let options = egui::TextureOptions {
             magnification: egui::TextureFilter::Nearest,
             minification: egui::TextureFilter::Linear,
@@ -91,6 +97,7 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
         viewer.picture.take(ui.ctx(), &painted);
     }
     move_camera(ui, viewer, area, &response);
+    super::failure::show(ui, viewer, area);
     let Some(painted) = viewer.picture.painted.clone() else {
         waiting(ui, viewer, area);
         return;
@@ -158,7 +165,6 @@ fn waiting(ui: &egui::Ui, viewer: &Viewer, area: Rect) {
         Phase::Preparing => "Preparing the scene …".to_owned(),
         Phase::Starting => "First photons …".to_owned(),
         Phase::Rendering => "First iteration …".to_owned(),
-        Phase::Failed(error) => error.clone(),
         _ => return,
     };
     let color = egui::Color32::from_gray(220);

@@ -21,7 +21,7 @@ use sunfleck::output::display::Look;
 use sunfleck::scene::load::Loaded;
 use sunfleck::scene::settings::Settings;
 
-pub use history::{History, Measured, OfIteration, Record, Series};
+pub use history::{History, Measured, Record, Series};
 pub use paint::{Comparison, Insides, Legend, Painted, Painting, Values, View};
 pub use session::Frame;
 
@@ -211,6 +211,8 @@ fn catch<T>(work: impl FnOnce() -> T) -> Result<T, String> {
 /// What can be seen at a moment.
 pub struct Now {
     pub phase: Phase,
+    /// The one under way; changes with every restart.
+    pub estimate: u64,
     pub device: String,
     pub opened: Option<Arc<Opened>>,
     /// The newest film.
@@ -291,6 +293,7 @@ impl Engine {
         let board = self.shared.board();
         Now {
             phase: board.phase.clone(),
+            estimate: board.estimate,
             device: board.device.clone(),
             opened: board.opened.clone(),
             frame: board.frame.clone(),
