@@ -18,6 +18,7 @@ struct Seen {
     remembered: Remembered,
     zoom: Option<f32>,
     help: bool,
+    selected: Option<usize>,
     asked: Vec<Purpose>,
 }
 
@@ -31,6 +32,7 @@ impl Seen {
             remembered: viewer.remembered.clone(),
             zoom: viewer.picture.zoom,
             help: viewer.show_help,
+            selected: viewer.selected,
             asked,
         }
     }
@@ -72,6 +74,15 @@ fn saved(window: &mut Window) {
     window.wait("file", move |_| path.exists());
     window.steps(2);
     window.wait_for_message("saved ");
+}
+
+fn paints_otherwise(seen: &mut Seen, window: &mut Window) {
+    let painting = window.viewer().wanted.painting;
+    assert_ne!(seen.wanted.painting, painting);
+    seen.wanted.painting = painting;
+    window.wait("other painting", |viewer| {
+        viewer.now.painted.as_ref().is_some_and(|painted| painted.painting == viewer.wanted.painting)
+    });
 }
 
 const fn case(modifiers: Modifiers, key: Key, effect: Effect) -> Case {
@@ -168,13 +179,7 @@ const CASES: &[Case] = &[
         Key::X,
         |seen, _| seen.wanted.painting.look.exposure = None,
     ),
-    case(Modifiers::NONE, Key::T, |seen, window| {
-        assert_ne!(seen.wanted.painting.look.tonemap, window.viewer().wanted.painting.look.tonemap);
-        seen.wanted.painting.look.tonemap = window.viewer().wanted.painting.look.tonemap;
-        window.wait("picture in other tones", |viewer| {
-            viewer.now.painted.as_ref().is_some_and(|painted| painted.painting == viewer.wanted.painting)
-        });
-    }),
+    case(Modifiers::NONE, Key::T, paints_otherwise),
     case(Modifiers::NONE, Key::Space, |seen, window| {
         seen.wanted.restarts += 1;
         let before = window.viewer().picture.painted().map(|painted| painted.frame.estimate);
@@ -208,7 +213,16 @@ const CASES: &[Case] = &[
         seen.help = true;
         assert!(window.shows("Keys and mouse") && SHORTCUTS.iter().all(|shortcut| window.shows(shortcut.what)));
     }),
-    after(|window| window.viewer().show_help = true, Modifiers::NONE, Key::Escape, |seen, _| seen.help = false),
+    after(
+        |window| (window.viewer().show_help, window.viewer().selected) = (true, Some(0)),
+        Modifiers::NONE,
+        Key::Escape,
+        |seen, _| (seen.help, seen.selected) = (false, None),
+    ),
+    case(Modifiers::NONE, Key::V, paints_otherwise),
+    case(SHIFT, Key::V, paints_otherwise),
+    case(Modifiers::NONE, Key::G, paints_otherwise),
+    case(Modifiers::NONE, Key::Num3, |seen, _| seen.zoom = Some(4.0)),
 ];
 
 #[test]
