@@ -136,14 +136,24 @@ impl Have {
     fn prepare(&mut self, shared: &Shared, device: &Device, wanted: &Wanted) -> Result<()> {
         let Some(opened) = self.opened.clone() else { return Ok(()) };
         let settings = wanted.settings.as_deref().unwrap_or(&opened.source.settings).clone();
-        let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
         let is_same_scene = |session: &Session| {
             Arc::ptr_eq(&session.opened, &opened)
                 && self.settings_used.as_ref().is_some_and(|used| of_scene(used) == of_scene(&settings))
         };
         match self.session.as_mut().filter(|session| is_same_scene(session)) {
-            Some(session) => session.input = input,
+            Some(session) => {
+                let t = std::time::Instant::now();
+                let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
+                let a = t.elapsed();
+                drop(input);
+                let t = std::time::Instant::now();
+                job::prepare_again(&mut session.input, &settings, &opened.loaded.scene)?;
+                eprintln!("TIMING {:.3} ms {:.3} ms", a.as_secs_f64() * 1e3, t.elapsed().as_secs_f64() * 1e3);
+            }
             None => {
+                let t = std::time::Instant::now();
+                let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
+                eprintln!("TIMING full {:.3} ms", t.elapsed().as_secs_f64() * 1e3);
                 shared.update(|board| board.phase = Phase::Preparing);
                 self.session = None; // Its memory first.
                 let warnings: Vec<_> = input.warnings.iter().cloned().map(Message::Warning).collect();
@@ -152,6 +162,7 @@ impl Have {
                     board.messages.extend(warnings);
                     board.device = session.device();
                 });
+                eprintln!("TIMING full with session {:.3} ms", t.elapsed().as_secs_f64() * 1e3);
                 self.session = Some(session);
             }
         }

@@ -45,7 +45,7 @@ pub fn row(ui: &mut Ui, name: Name, is_changed: bool, control: impl FnOnce(&mut 
             control(ui).labelled_by(label.id).on_hover_text(name.hint)
         });
         if is_changed {
-            let button = egui::Button::new("⟲").frame(false).min_size(egui::vec2(RESET, height));
+            let button = egui::Button::new("↺").frame(false).min_size(egui::vec2(RESET, height));
             let response = ui.add(button).on_hover_text("Back to what the file says");
             response.widget_info(|| {
                 egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Reset {}", name.name.to_lowercase()))
@@ -75,7 +75,20 @@ pub fn slider(
 pub fn metres(ui: &mut Ui, value: &mut f32, least: f32) -> Response {
     let speed = f64::from(value.abs()).max(1e-3) * 0.01;
     let drag = DragValue::new(value).speed(speed).range(least..=f32::MAX).suffix(" m").update_while_editing(false);
-    ui.add_sized(egui::vec2(ui.available_width(), ui.spacing().interact_size.y), drag.max_decimals(6))
+    ui.add_sized(
+        egui::vec2(ui.available_width(), ui.spacing().interact_size.y),
+        drag.custom_formatter(|x, _| length_text(x)),
+    )
+}
+
+/// To four significant digits.
+fn length_text(metres: f64) -> String {
+    if metres == 0.0 || !metres.is_finite() {
+        return metres.to_string();
+    }
+    let digits = (3 - metres.abs().log10().floor() as i32).clamp(0, 9) as usize;
+    let text = format!("{metres:.digits$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
 /// One of a list; says whether another was chosen.
@@ -150,6 +163,15 @@ mod tests {
             assert_eq!(count_of(&count_text(n)), Some(n));
         }
         assert_eq!(count_of("many"), None);
+    }
+
+    #[test]
+    fn lengths_are_short() {
+        for (metres, text) in
+            [(0.0, "0"), (0.591_425, "0.5914"), (0.002, "0.002"), (12.5, "12.5"), (123_456.7, "123457")]
+        {
+            assert_eq!(length_text(metres), text);
+        }
     }
 
     #[test]
