@@ -55,6 +55,10 @@ pub struct Viewer {
     pub edits: Edits,
     pub remembered: Remembered,
     pub picture: PictureView,
+    pub inspect: super::inspect::InspectView,
+    pub compare: super::compare::CompareView,
+    /// Index into the scene's materials.
+    pub selected: Option<usize>,
     pub output: Option<PathBuf>,
     /// With the times they appeared.
     messages: Vec<(f64, Message)>,
@@ -80,6 +84,9 @@ impl Viewer {
             edits: Edits::default(),
             remembered,
             picture: PictureView::default(),
+            inspect: Default::default(),
+            compare: Default::default(),
+            selected: None,
             output: first.output,
             messages: vec![],
             show_help: false,
@@ -264,6 +271,7 @@ impl Viewer {
             _ => false,
         };
         if !same {
+            self.selected = None;
             let is_reload = self.wanted.settings.is_some() && self.now.opened.is_some();
             self.editing = self.now.opened.clone();
             if let Some(opened) = &self.editing {

@@ -45,6 +45,9 @@ pub const SHORTCUTS: &[Shortcut] = &[
     command(Key::Z, "undo", |_, v| v.undo()),
     command(Key::Y, "redo", |_, v| v.redo()),
     shift(Key::E, "half a stop darker", |_, v| v.expose(-0.5)),
+    shift(Key::V, "view before", |_, v| v.next_view(-1)),
+    key(Key::V, "next view", |_, v| v.next_view(1)),
+    key(Key::G, "photons over the picture: by power, by bounce, none", |_, v| v.next_photons()),
     key(Key::E, "half a stop brighter", |_, v| v.expose(0.5)),
     key(Key::X, "automatic exposure", |_, v| v.wanted.painting.look.exposure = None),
     key(Key::T, "next tone curve", |_, v| v.next_tone()),
@@ -54,12 +57,16 @@ pub const SHORTCUTS: &[Shortcut] = &[
     key(Key::F, "frame all", |ui, v| v.frame_all(ui.input(|i| i.time))),
     key(Key::Num1, "picture as large as the window", |_, v| v.picture.fit()),
     key(Key::Num2, "one pixel to a point", |_, v| v.picture.zoom = Some(1.0)),
+    key(Key::Num3, "four points to a pixel", |_, v| v.picture.zoom = Some(4.0)),
     key(Key::F1, "settings, shown or hidden", |_, v| v.remembered.show_settings ^= true),
     key(Key::F2, "inspection, shown or hidden", |_, v| v.remembered.show_inspect ^= true),
     key(Key::F3, "convergence, shown or hidden", |_, v| v.remembered.show_convergence ^= true),
     key(Key::F12, "save a picture of the window", |ui, v| files::screenshot(ui, v)),
     key(Key::Questionmark, "this help", |_, v| v.show_help ^= true),
-    key(Key::Escape, "close the help", |_, v| v.show_help = false),
+    key(Key::Escape, "close the help, select nothing", |_, v| {
+        v.show_help = false;
+        v.selected = None;
+    }),
 ];
 
 /// Does what was asked for by keys, unless they are typed into a field.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use eframe::egui;
 use egui::{Key, PointerButton, Rect, Vec2, pos2, vec2};
 use glam::Vec3;
+use sunfleck::inspect;
 use sunfleck::scene::settings::{CameraSettings, Settings};
 
 use super::app::Viewer;
@@ -104,16 +105,47 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
         painter.image(texture.id(), rect, uv, egui::Color32::WHITE);
     }
     super::compare::overlay(ui, viewer, &painter, rect);
-    let scale = vec2(painted.size[0] as f32, painted.size[1] as f32) / rect.size();
-    viewer.picture.hovered = response.hover_pos().filter(|p| rect.contains(*p)).map(|p| {
-        let at = (p - rect.min) * scale;
-        [(at.x as usize).min(painted.size[0] - 1), (at.y as usize).min(painted.size[1] - 1)]
-    });
+    // Beside the reference's line too, which takes the pointer for itself.
+    let pointer = ui.input(|i| i.pointer.latest_pos()).filter(|p| response.contains_pointer() && area.contains(*p));
+    let at = pointer.and_then(|p| on_film(rect, painted.size, p));
+    let hovered = at.map(|at| [at.x as usize, at.y as usize]);
+    if viewer.picture.hovered != hovered {
+        viewer.picture.hovered = hovered;
+        // The panel that tells of it was drawn before.
+        ui.ctx().request_repaint();
+    }
+    click(ui, viewer, &response, rect, &painted);
     if rect.width() / painted.size[0] as f32 >= VALUES_FROM {
         values(&painter, area, rect, &painted);
     }
     if matches!(viewer.now.phase, Phase::Loading | Phase::Preparing) {
         waiting(ui, viewer, area);
+    }
+}
+
+/// A place on the screen in film coordinates; none beside the picture.
+fn on_film(rect: Rect, size: [usize; 2], point: egui::Pos2) -> Option<glam::Vec2> {
+    let [width, height] = size.map(|n| n as f32);
+    let at = (point - rect.min) * vec2(width, height) / rect.size();
+    let inside = at.x >= 0.0 && at.y >= 0.0 && at.x < width && at.y < height;
+    inside.then(|| glam::vec2(at.x, at.y))
+}
+
+/// Selects what is clicked on; a double click also turns to it.
+fn click(ui: &egui::Ui, viewer: &mut Viewer, response: &egui::Response, rect: Rect, painted: &Painted) {
+    if !response.clicked_by(PointerButton::Primary) {
+        return;
+    }
+    let Some(point) = response.interact_pointer_pos() else { return };
+    let frame = &painted.frame;
+    let hit = on_film(rect, painted.size, point).and_then(|at| inspect::pick(&frame.scene, &frame.view(), at));
+    let n_materials = viewer.opened().map_or(0, |opened| opened.loaded.scene.materials.len());
+    viewer.selected = hit.map(|hit| hit.material as usize).filter(|&index| index < n_materials);
+    if let (true, Some(hit)) = (response.double_clicked_by(PointerButton::Primary), hit) {
+        viewer.move_rig(ui.input(|i| i.time), &mut |rig| {
+            rig.set_pivot(hit.position);
+            rig.focus_on(hit.position);
+        });
     }
 }
 
@@ -290,5 +322,25 @@ impl Viewer {
     /// Of the picture that is wanted, pixels.
     pub fn full_size(&self) -> Option<[u32; 2]> {
         Some(crate::job::size(self.edits.now(), &self.camera()?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_film_is_where_the_picture_is() {
+        let rect = Rect::from_min_size(pos2(100.0, 50.0), vec2(400.0, 200.0));
+        for size in [[400, 200], [100, 50], [1, 1]] {
+            let [width, height] = size.map(|n| n as f32);
+            let middle = on_film(rect, size, rect.center()).unwrap();
+            assert_eq!(middle, glam::vec2(0.5 * width, 0.5 * height));
+            assert_eq!(on_film(rect, size, rect.min), Some(glam::Vec2::ZERO));
+            for outside in [rect.max, pos2(99.0, 100.0), pos2(300.0, 49.9), pos2(300.0, 250.0)] {
+                assert_eq!(on_film(rect, size, outside), None);
+            }
+        }
+        assert_eq!(on_film(Rect::NOTHING, [4, 4], pos2(1.0, 1.0)), None);
     }
 }

@@ -263,6 +263,17 @@ impl Engine {
         self.shared.changed.notify_all();
     }
 
+    /// What other threads set it with.
+    pub fn referee(&self) -> impl Fn(Reference) + Send + 'static {
+        let shared = Arc::clone(&self.shared);
+        move |reference| {
+            shared.update(|board| {
+                board.history.against_reference.clear();
+                board.reference = Some(Arc::new(reference));
+            });
+        }
+    }
+
     /// What there is.
     pub fn now(&self) -> Now {
         let board = self.shared.board();

@@ -8,7 +8,7 @@ use anyhow::Result;
 use sunfleck::inspect::{self, FirstHits};
 use sunfleck::layout::Photon;
 use sunfleck::output::Picture;
-use sunfleck::output::compare::compare;
+use sunfleck::output::compare::{Difference, compare};
 use sunfleck::output::convergence::Halves;
 use sunfleck::output::difference::{self, Measure};
 use sunfleck::output::display::{self, Look};
@@ -166,6 +166,8 @@ pub struct Painted {
     pub reference: Option<(Arc<Reference>, Vec<u8>)>,
     /// Mean of the comparison that is shown.
     pub mean: Option<f64>,
+    /// The film against the reference; none of a preview.
+    pub figures: Option<Difference>,
     /// Why what was wanted could not be painted.
     pub problem: Option<String>,
 }
@@ -195,20 +197,25 @@ pub fn run(shared: &Shared) {
             let Some(frame) = board.frame.clone() else { continue };
             (frame, board.reference.clone(), board.wanted.painting)
         };
-        let work = || {
-            let measured = painter.measure(&frame, reference.as_deref());
-            (Arc::new(painter.paint(&frame, reference, painting)), measured)
+        let mut work = || {
+            let (estimated, figures) = painter.measure(&frame, reference.as_deref());
+            let painted = painter.paint(&frame, reference.clone(), painting);
+            (Arc::new(Painted { figures, ..painted }), estimated)
         };
         // Without a pool of its own it takes the common one.
-        let (painted, (estimated, against_reference)) = match &pool {
+        let (painted, estimated) = match &pool {
             Ok(pool) => pool.install(work),
             Err(_) => work(),
         };
         shared.update(|board| {
+            let measured = painted.figures.map(|figures| figures.rel_mse);
+            let is_same_reference = same(reference.as_ref(), board.reference.as_ref());
             board.painted = Some(painted);
             if frame.estimate == board.estimate && !frame.is_preview {
                 push(&mut board.history.estimated, frame.film.n_iterations, estimated);
-                push(&mut board.history.against_reference, frame.film.n_iterations, against_reference);
+                if is_same_reference {
+                    push(&mut board.history.against_reference, frame.film.n_iterations, measured);
+                }
             }
         });
     }
@@ -223,21 +230,27 @@ fn push(list: &mut Vec<Measured>, iteration: u32, rel_mse: Option<f64>) {
 }
 
 fn is_painted(board: &Board, frame: &Arc<Frame>) -> bool {
-    let same_reference = |a: Option<&Arc<Reference>>, b: Option<&Arc<Reference>>| match (a, b) {
-        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
-        (a, b) => a.is_none() && b.is_none(),
-    };
     board.painted.as_ref().is_some_and(|painted| {
         Arc::ptr_eq(&painted.frame, frame)
             && painted.painting == board.wanted.painting
-            && same_reference(painted.reference.as_ref().map(|r| &r.0), fitting(board.reference.as_ref(), frame))
+            && same(painted.reference.as_ref().map(|r| &r.0), fitting(board.reference.as_ref(), frame))
     })
+}
+
+fn same(a: Option<&Arc<Reference>>, b: Option<&Arc<Reference>>) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+        (a, b) => a.is_none() && b.is_none(),
+    }
 }
 
 /// The reference, if it has the picture's size.
 fn fitting<'a>(reference: Option<&'a Arc<Reference>>, frame: &Frame) -> Option<&'a Arc<Reference>> {
     reference.filter(|r| (r.picture.size, r.picture.crop) == (frame.params.size, frame.params.crop))
 }
+
+/// What [`View::Stops`] spans, about mid grey.
+const STOPS: [f32; 2] = [-8.0, 8.0];
 
 /// What is kept from frame to frame.
 #[derive(Default)]
@@ -256,7 +269,7 @@ struct Colours {
 
 impl Painter {
     /// Error estimated from the halves, and measured against the reference.
-    fn measure(&mut self, frame: &Frame, reference: Option<&Reference>) -> (Option<f64>, Option<f64>) {
+    fn measure(&mut self, frame: &Frame, reference: Option<&Reference>) -> (Option<f64>, Option<Difference>) {
         if frame.is_preview {
             return (None, None);
         }
@@ -264,7 +277,7 @@ impl Painter {
             self.halves = (frame.estimate, Halves::default());
         }
         self.halves.1.add(&frame.film);
-        let measured = reference.and_then(|r| compare(&frame.picture(), &r.picture).ok()).map(|d| d.rel_mse);
+        let measured = reference.and_then(|r| compare(&frame.picture(), &r.picture).ok());
         (self.halves.1.rel_mse(), measured)
     }
 
@@ -274,7 +287,12 @@ impl Painter {
         let tonemap = painting.look.tonemap;
         let reference = fitting(reference.as_ref(), frame).map(|reference| {
             let mut rgba = vec![];
-            display::rgba8(&reference.picture, exposure, tonemap, &mut rgba);
+            match painting.view {
+                View::Stops => {
+                    false_colour::luminance_in_stops(&reference.picture.rgb, exposure, STOPS, &mut rgba);
+                }
+                _ => display::rgba8(&reference.picture, exposure, tonemap, &mut rgba),
+            }
             (Arc::clone(reference), rgba)
         });
         let histogram = Histogram::of(&picture.rgb, exposure);
@@ -307,6 +325,7 @@ impl Painter {
             histogram,
             reference,
             mean: colours.mean,
+            figures: None,
             problem,
         }
     }
@@ -326,7 +345,6 @@ impl Painter {
         match painting.view {
             View::Picture => as_picture(picture.rgb),
             View::Stops => {
-                const STOPS: [f32; 2] = [-8.0, 8.0];
                 let mut rgba = vec![];
                 false_colour::luminance_in_stops(&picture.rgb, exposure, STOPS, &mut rgba);
                 let legend = Some(Legend { range: STOPS, log: false, signed: false });
@@ -337,20 +355,24 @@ impl Painter {
             View::Indirect => lit(part(|p| p.indirect), picture),
             View::Albedo => plain(self.hits(frame).base_colors(), |c| c),
             View::Normal => plain(self.hits(frame).normals(), |c| 0.5 * c + 0.5),
-            View::Depth => scalar(self.hits(frame).depths(), false),
-            View::PhotonCount => scalar(
-                frame.insides.as_ref().map_or(vec![], |i| i.split.pixels.iter().map(|p| p.gathered).collect()),
-                true,
-            ),
-            View::NodesVisited => {
-                let nodes =
-                    frame.insides.as_ref().map_or(vec![], |i| i.nodes_visited.iter().map(|&n| n as f32).collect());
-                scalar(nodes, false)
+            View::Depth => {
+                let mut colours = scalar(self.hits(frame).depths(), false);
+                far(&mut colours);
+                colours
+            }
+            View::PhotonCount | View::NodesVisited => {
+                let Some(insides) = &frame.insides else { return as_picture(picture.rgb) };
+                match painting.view {
+                    View::PhotonCount => scalar(insides.split.pixels.iter().map(|p| p.gathered).collect(), true),
+                    _ => scalar(insides.nodes_visited.iter().map(|&n| n as f32).collect(), false),
+                }
             }
             View::Radius => {
                 let scale = frame.radius / frame.first_radius.max(f32::MIN_POSITIVE);
                 scalar(frame.first_radii.iter().map(|r| r * scale).collect(), true)
             }
+            // One iteration has none.
+            View::Variance if frame.film.n_iterations < 2 => as_picture(picture.rgb),
             View::Variance => scalar(frame.film.variance_of_mean(), true),
         }
     }
@@ -407,6 +429,16 @@ fn scalar(values: Vec<f32>, log: bool) -> Colours {
     let range = false_colour::scalar(&values, &Scale { range: None, log }, &mut rgba);
     let legend = Some(Legend { range, log, signed: false });
     Colours { rgba, values: Values::Scalar(Arc::new(values)), legend, mean: None }
+}
+
+/// What is endlessly far away looks like what is farthest.
+fn far(colours: &mut Colours) {
+    let Values::Scalar(depths) = &colours.values else { return };
+    for (rgba, depth) in colours.rgba.chunks_exact_mut(4).zip(depths.iter()) {
+        if *depth == f32::INFINITY {
+            rgba.copy_from_slice(&false_colour::colour(1.0));
+        }
+    }
 }
 
 /// Numbers in [0, 1] as they are.
