@@ -64,8 +64,6 @@ pub struct Viewer {
     messages: Vec<(f64, Message)>,
     pub show_help: bool,
     pub dialog: Option<files::Dialog>,
-    /// Index of the material of what was clicked on.
-    pub selected: Option<usize>,
     pub start: super::start::Page,
     wake: Wake,
     /// The scene that `edits` belongs to.
@@ -91,7 +89,6 @@ impl Viewer {
             messages: vec![],
             show_help: false,
             dialog: None,
-            selected: None,
             start: Default::default(),
             wake,
             editing: None,
@@ -280,7 +277,6 @@ impl Viewer {
                     self.edits = Edits::new(opened.source.settings.clone());
                     self.wanted.painting.look.exposure = opened.source.settings.exposure;
                     self.picture = PictureView::default();
-                    self.selected = None;
                 }
             }
         }

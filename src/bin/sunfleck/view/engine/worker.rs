@@ -141,19 +141,9 @@ impl Have {
                 && self.settings_used.as_ref().is_some_and(|used| of_scene(used) == of_scene(&settings))
         };
         match self.session.as_mut().filter(|session| is_same_scene(session)) {
-            Some(session) => {
-                let t = std::time::Instant::now();
-                let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
-                let a = t.elapsed();
-                drop(input);
-                let t = std::time::Instant::now();
-                job::prepare_again(&mut session.input, &settings, &opened.loaded.scene)?;
-                eprintln!("TIMING {:.3} ms {:.3} ms", a.as_secs_f64() * 1e3, t.elapsed().as_secs_f64() * 1e3);
-            }
+            Some(session) => job::prepare_again(&mut session.input, &settings, &opened.loaded.scene)?,
             None => {
-                let t = std::time::Instant::now();
                 let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
-                eprintln!("TIMING full {:.3} ms", t.elapsed().as_secs_f64() * 1e3);
                 shared.update(|board| board.phase = Phase::Preparing);
                 self.session = None; // Its memory first.
                 let warnings: Vec<_> = input.warnings.iter().cloned().map(Message::Warning).collect();
@@ -162,7 +152,6 @@ impl Have {
                     board.messages.extend(warnings);
                     board.device = session.device();
                 });
-                eprintln!("TIMING full with session {:.3} ms", t.elapsed().as_secs_f64() * 1e3);
                 self.session = Some(session);
             }
         }

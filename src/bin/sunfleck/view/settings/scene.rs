@@ -7,7 +7,7 @@ use sunfleck::scene::defaults::has_light;
 use sunfleck::scene::settings::{EnvironmentSettings, MaterialSettings, SceneLightSettings, Settings};
 use sunfleck::scene::{Material, PunctualKind, PunctualLight, Scene};
 
-use super::widgets::{Name, row, slider};
+use super::widgets::{Name, back, row, slider};
 use crate::view::app::Viewer;
 
 const SOURCE: Name = Name { name: "Source", hint: "Where the light from infinitely far away comes from." };
@@ -205,8 +205,7 @@ fn light(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, i: us
                 now.strength = Some(strength);
             }
             if before != was {
-                let button = egui::Button::new("↺").frame(false);
-                reset = ui.add(button).on_hover_text("Back to what the file says").clicked();
+                reset = back(ui, &name);
             }
         });
     });

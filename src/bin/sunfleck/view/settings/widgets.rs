@@ -45,15 +45,27 @@ pub fn row(ui: &mut Ui, name: Name, is_changed: bool, control: impl FnOnce(&mut 
             control(ui).labelled_by(label.id).on_hover_text(name.hint)
         });
         if is_changed {
-            let button = egui::Button::new("↺").frame(false).min_size(egui::vec2(RESET, height));
-            let response = ui.add(button).on_hover_text("Back to what the file says");
-            response.widget_info(|| {
-                egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Reset {}", name.name.to_lowercase()))
-            });
-            reset = response.clicked();
+            reset = back(ui, name.name);
         }
     });
     reset
+}
+
+/// The way back, of something with a name; says whether it is taken.
+pub fn back(ui: &mut Ui, name: &str) -> bool {
+    let size = egui::vec2(RESET, ui.spacing().interact_size.y);
+    let (rect, response) = ui.allocate_exact_size(size, egui::Sense::click());
+    let label = format!("Reset {}", name.to_lowercase());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &label));
+    let visuals = ui.style().interact(&response);
+    // Three quarters of a turn, and the head of an arrow; no font that comes with egui has it.
+    let (middle, radius, stroke) = (rect.center(), 4.5, egui::Stroke::new(1.5, visuals.fg_stroke.color));
+    let at = |turn: f32, radius: f32| middle + radius * egui::Vec2::angled(turn * std::f32::consts::TAU);
+    let arc = (0..=16).map(|i| at(-0.4 + 0.75 * i as f32 / 16.0, radius)).collect();
+    ui.painter().add(egui::Shape::line(arc, stroke));
+    let head = vec![at(-0.4, radius - 3.5), at(-0.4, radius + 3.5), at(-0.55, radius)];
+    ui.painter().add(egui::Shape::convex_polygon(head, stroke.color, egui::Stroke::NONE));
+    response.on_hover_text("Back to what the file says").clicked()
 }
 
 /// A slider with its value beside it, in all of the room. What is typed may lie outside the range.
