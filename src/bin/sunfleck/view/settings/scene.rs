@@ -5,7 +5,7 @@ use egui::Ui;
 use glam::Vec3;
 use sunfleck::scene::defaults::has_light;
 use sunfleck::scene::settings::{EnvironmentSettings, MaterialSettings, SceneLightSettings, Settings};
-use sunfleck::scene::{Material, PunctualKind, PunctualLight, Scene};
+use sunfleck::scene::{PunctualKind, PunctualLight, Scene};
 
 use super::widgets::{Name, back, row, slider};
 use crate::view::app::Viewer;
@@ -255,6 +255,7 @@ pub fn tidy(settings: &mut Settings, read: &Settings) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sunfleck::scene::Material;
 
     #[test]
     fn changes_of_nothing_are_tidied_away() {

@@ -11,11 +11,6 @@ const NAMES: f32 = 0.36;
 /// For the way back, points.
 const RESET: f32 = 18.0;
 
-/// Added to what changes the picture that is rendered.
-pub const RESTARTS: &str = "Restarts the estimate.";
-/// Added to what changes only how it is shown.
-pub const KEEPS: &str = "Does not restart the estimate.";
-
 /// A setting's name, and what is said about it.
 #[derive(Clone, Copy)]
 pub struct Name {
