@@ -121,8 +121,23 @@ pub fn prepare(source: &Source, settings: &Settings, mut loaded: Loaded, args: &
     Ok(Input { scene, camera, params, warnings })
 }
 
+/// The same for settings that change the scene as those did that `input` was made with; `as_read` is the scene before
+/// them. Nothing is copied: the camera may move at every frame of a window.
+#[cfg(feature = "view")]
+pub fn prepare_again(input: &mut Input, settings: &Settings, as_read: &Scene) -> Result<()> {
+    let cameras = match as_read.cameras.is_empty() {
+        true => vec![default_camera(&input.scene)],
+        false => as_read.cameras.clone(),
+    };
+    let camera = settings.camera_of(&Scene { cameras, ..Scene::default() })?;
+    camera.check()?;
+    input.params = params(settings, &InputArgs::default(), &camera)?;
+    input.camera = camera;
+    Ok(())
+}
+
 /// The command line over the settings over the defaults.
-pub fn params(settings: &Settings, args: &InputArgs, camera: &Camera) -> Result<Params> {
+fn params(settings: &Settings, args: &InputArgs, camera: &Camera) -> Result<Params> {
     let [width, height] = args.resolution.unwrap_or_else(|| size(settings, camera));
     let mut params = Params::new(width, height);
     if args.paper {
@@ -286,7 +301,7 @@ fn available_memory() -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sunfleck::scene::settings::{Count, Size};
+    use sunfleck::scene::settings::{CameraSettings, Count, Size};
 
     /// As a window needs it: the file is read once, the settings change.
     #[test]
@@ -294,6 +309,7 @@ mod tests {
         let source = Source::resolve("cornell").unwrap();
         let loaded = source.scene().unwrap();
         let args = InputArgs::default();
+        let as_read = loaded.scene.clone();
         let first = prepare(&source, &source.settings, loaded.clone(), &args).unwrap();
         let mut settings = source.settings.clone();
         settings.size = Some(Size([32, 16]));
@@ -310,6 +326,19 @@ mod tests {
         let third = prepare(&source, &source.settings, loaded, &args).unwrap();
         assert_eq!((third.params.size, third.params.n_paths), (first.params.size, 5));
         assert_eq!(third.scene.materials[0].roughness, first.scene.materials[0].roughness);
+        // Without the scene, and as if with it.
+        let mut again = prepare(&source, &source.settings, source.scene().unwrap(), &args).unwrap();
+        settings.camera = Some(CameraSettings { position: Some([0.5, 1.0, 3.0]), ..CameraSettings::default() });
+        for _ in 0..2 {
+            prepare_again(&mut again, &settings, &as_read).unwrap();
+            let whole = prepare(&source, &settings, source.scene().unwrap(), &args).unwrap();
+            assert_eq!((again.params.size, again.params.n_paths), (whole.params.size, whole.params.n_paths));
+            assert_eq!(again.camera.pack(4, 3), whole.camera.pack(4, 3));
+            settings.camera = None;
+        }
+        settings.alpha = Some(2.0);
+        assert!(prepare_again(&mut again, &settings, &as_read).is_err());
+        settings.alpha = None;
         settings.set("material.none.ior=2").unwrap();
         let error = prepare(&source, &settings, source.scene().unwrap(), &args).err().map(|e| crate::chain(&e));
         assert!(

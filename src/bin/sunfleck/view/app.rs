@@ -101,7 +101,6 @@ impl Viewer {
             show_help: false,
             dialog: None,
             pick: Arc::new(files::pick),
-            selected: None,
             start: Default::default(),
             wake,
             editing: None,

@@ -145,13 +145,16 @@ impl Have {
     fn prepare(&mut self, shared: &Shared, device: &Device, wanted: &Wanted) -> Result<()> {
         let Some(opened) = self.opened.clone() else { return Ok(()) };
         let settings = wanted.settings.as_deref().unwrap_or(&opened.source.settings).clone();
-        let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
         let is_same_scene = |session: &Session| {
             Arc::ptr_eq(&session.opened, &opened) && of_scene(&session.settings) == of_scene(&settings)
         };
         match self.session.as_mut().filter(|session| is_same_scene(session)) {
-            Some(session) => (session.input, session.settings) = (input, Arc::new(settings)),
+            Some(session) => {
+                job::prepare_again(&mut session.input, &settings, &opened.loaded.scene)?;
+                session.settings = Arc::new(settings);
+            }
             None => {
+                let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
                 shared.update(|board| board.phase = Phase::Preparing);
                 self.session = None; // Its memory first.
                 let warnings: Vec<_> = input.warnings.iter().cloned().map(Message::Warning).collect();

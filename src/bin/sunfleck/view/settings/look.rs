@@ -40,7 +40,11 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     let mut tone = viewer.wanted.painting.look.tonemap;
     let reset = row(ui, TONE, tone != ToneMap::default(), |ui| {
         let all = [
-            (ToneMap::Neutral, "Khronos PBR Neutral", "Colours stay as they are, highlights are compressed."),
+            (
+                ToneMap::Neutral,
+                "PBR Neutral",
+                "Khronos PBR Neutral: colours stay as they are, highlights are compressed.",
+            ),
             (ToneMap::Agx, "AgX", "Film-like: bright saturated colours fade to white."),
             (ToneMap::Srgb, "sRGB", "None: what is too bright is cut off."),
         ];

@@ -11,11 +11,6 @@ const NAMES: f32 = 0.36;
 /// For the way back, points.
 const RESET: f32 = 18.0;
 
-/// Added to what changes the picture that is rendered.
-pub const RESTARTS: &str = "Restarts the estimate.";
-/// Added to what changes only how it is shown.
-pub const KEEPS: &str = "Does not restart the estimate.";
-
 /// A setting's name, and what is said about it.
 #[derive(Clone, Copy)]
 pub struct Name {
@@ -45,15 +40,27 @@ pub fn row(ui: &mut Ui, name: Name, is_changed: bool, control: impl FnOnce(&mut 
             control(ui).labelled_by(label.id).on_hover_text(name.hint)
         });
         if is_changed {
-            let button = egui::Button::new("⟲").frame(false).min_size(egui::vec2(RESET, height));
-            let response = ui.add(button).on_hover_text("Back to what the file says");
-            response.widget_info(|| {
-                egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Reset {}", name.name.to_lowercase()))
-            });
-            reset = response.clicked();
+            reset = back(ui, name.name);
         }
     });
     reset
+}
+
+/// The way back, of something with a name; says whether it is taken.
+pub fn back(ui: &mut Ui, name: &str) -> bool {
+    let size = egui::vec2(RESET, ui.spacing().interact_size.y);
+    let (rect, response) = ui.allocate_exact_size(size, egui::Sense::click());
+    let label = format!("Reset {}", name.to_lowercase());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, &label));
+    let visuals = ui.style().interact(&response);
+    // Three quarters of a turn, and the head of an arrow; no font that comes with egui has it.
+    let (middle, radius, stroke) = (rect.center(), 4.5, egui::Stroke::new(1.5, visuals.fg_stroke.color));
+    let at = |turn: f32, radius: f32| middle + radius * egui::Vec2::angled(turn * std::f32::consts::TAU);
+    let arc = (0..=16).map(|i| at(-0.4 + 0.75 * i as f32 / 16.0, radius)).collect();
+    ui.painter().add(egui::Shape::line(arc, stroke));
+    let head = vec![at(-0.4, radius - 3.5), at(-0.4, radius + 3.5), at(-0.55, radius)];
+    ui.painter().add(egui::Shape::convex_polygon(head, stroke.color, egui::Stroke::NONE));
+    response.on_hover_text("Back to what the file says").clicked()
 }
 
 /// A slider with its value beside it, in all of the room. What is typed may lie outside the range.
@@ -75,7 +82,20 @@ pub fn slider(
 pub fn metres(ui: &mut Ui, value: &mut f32, least: f32) -> Response {
     let speed = f64::from(value.abs()).max(1e-3) * 0.01;
     let drag = DragValue::new(value).speed(speed).range(least..=f32::MAX).suffix(" m").update_while_editing(false);
-    ui.add_sized(egui::vec2(ui.available_width(), ui.spacing().interact_size.y), drag.max_decimals(6))
+    ui.add_sized(
+        egui::vec2(ui.available_width(), ui.spacing().interact_size.y),
+        drag.custom_formatter(|x, _| length_text(x)),
+    )
+}
+
+/// To four significant digits.
+fn length_text(metres: f64) -> String {
+    if metres == 0.0 || !metres.is_finite() {
+        return metres.to_string();
+    }
+    let digits = (3 - metres.abs().log10().floor() as i32).clamp(0, 9) as usize;
+    let text = format!("{metres:.digits$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
 /// One of a list; says whether another was chosen.
@@ -150,6 +170,15 @@ mod tests {
             assert_eq!(count_of(&count_text(n)), Some(n));
         }
         assert_eq!(count_of("many"), None);
+    }
+
+    #[test]
+    fn lengths_are_short() {
+        for (metres, text) in
+            [(0.0, "0"), (0.591_425, "0.5914"), (0.002, "0.002"), (12.5, "12.5"), (123_456.7, "123457")]
+        {
+            assert_eq!(length_text(metres), text);
+        }
     }
 
     #[test]
