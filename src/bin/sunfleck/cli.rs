@@ -180,6 +180,10 @@ pub struct ViewArgs {
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
 
+    /// Picture to compare with and to measure errors against, .exr
+    #[arg(long, value_name = "FILE")]
+    pub reference: Option<PathBuf>,
+
     /// Pause after so many iterations
     #[arg(long, visible_alias = "spp", value_name = "N", allow_hyphen_values = true, value_parser = parse_count)]
     pub iterations: Option<u32>,

@@ -28,6 +28,8 @@ pub struct First {
     pub limits: Limits,
     /// Where saving goes without asking.
     pub output: Option<PathBuf>,
+    /// To compare with.
+    pub reference: Option<PathBuf>,
 }
 
 impl First {
@@ -42,7 +44,7 @@ impl First {
             bail!(Usage("--set changes a scene: which one?".into()));
         }
         let limits = Limits { iterations: args.iterations, seconds: args.seconds, noise: args.noise };
-        Ok(Self { choice, limits, output: args.output.clone() })
+        Ok(Self { choice, limits, output: args.output.clone(), reference: args.reference.clone() })
     }
 }
 
@@ -71,6 +73,8 @@ pub struct Viewer {
     messages: Vec<(f64, Message)>,
     pub show_help: bool,
     pub dialog: Option<files::Dialog>,
+    /// To be read.
+    reference: Option<PathBuf>,
     pub pick: files::Pick,
     pub start: super::start::Page,
     wake: Wake,
@@ -100,7 +104,9 @@ impl Viewer {
             messages: vec![],
             show_help: false,
             dialog: None,
+            reference: first.reference,
             pick: Arc::new(files::pick),
+            selected: None,
             start: Default::default(),
             wake,
             editing: None,
@@ -253,6 +259,9 @@ impl Viewer {
         self.look_at_engine(ui);
         let wanted = self.wanted.clone();
         files::poll(ui, self);
+        if let Some(path) = self.reference.take() {
+            super::compare::load(ui, self, &path);
+        }
         super::keys::handle(ui, self);
         egui::Panel::top("bar").show(ui, |ui| super::bar::show(ui, self));
         egui::Panel::bottom("status").show(ui, |ui| super::bar::status(ui, self));

@@ -55,7 +55,7 @@ impl Made {
 }
 
 /// All, in the order they are listed in.
-fn comparisons() -> impl Iterator<Item = Comparison> {
+fn comparisons() -> impl Iterator<Item = Comparison> + Clone {
     let differences = Measure::ALL.into_iter().map(Comparison::Difference);
     [Comparison::Off, Comparison::Wipe].into_iter().chain(differences).chain([Comparison::Flip])
 }
@@ -73,6 +73,15 @@ fn describe(comparison: Comparison) -> (&'static str, &'static str) {
             Measure::Signed => ("Signed difference", "x − y: green where the picture is brighter, red where darker"),
         },
         Comparison::Flip => ("FLIP", "The difference as eyes see it, of both as they are shown now"),
+    }
+}
+
+impl Viewer {
+    /// The next of the list, from the last to the first.
+    pub fn next_comparison(&mut self) {
+        let wanted = &mut self.wanted.painting.comparison;
+        let mut following = comparisons().cycle().skip_while(|comparison| comparison != wanted).skip(1);
+        *wanted = following.next().unwrap_or_default();
     }
 }
 

@@ -53,6 +53,7 @@ pub const SHORTCUTS: &[Shortcut] = &[
     key(Key::E, "half a stop brighter", |_, v| v.expose(0.5)),
     key(Key::X, "automatic exposure", |_, v| v.wanted.painting.look.exposure = None),
     key(Key::T, "next tone curve", |_, v| v.next_tone()),
+    key(Key::C, "next comparison with the reference", |_, v| v.next_comparison()),
     key(Key::Space, "restart", |_, v| v.restart()),
     key(Key::P, "pause, go on", |_, v| v.wanted.paused = !v.wanted.paused),
     key(Key::N, "one iteration, then pause", |_, v| v.step()),

@@ -59,6 +59,7 @@ impl Window {
             choice: scene.map(|name| Choice { name: name.to_owned(), set }),
             limits: Limits { iterations: Some(ITERATIONS), ..Limits::default() },
             output: None,
+            reference: None,
         };
         let engine = Engine::start(Device::Cpu, Arc::new(|| {})).unwrap();
         let mut viewer = Viewer::new(None, engine, Arc::new(|| {}), first);

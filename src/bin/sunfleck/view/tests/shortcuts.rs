@@ -222,6 +222,15 @@ const CASES: &[Case] = &[
     case(Modifiers::NONE, Key::V, paints_otherwise),
     case(SHIFT, Key::V, paints_otherwise),
     case(Modifiers::NONE, Key::G, paints_otherwise),
+    after(
+        |window| {
+            window.click("Pin");
+            window.wait("reference", |viewer| viewer.now.reference.is_some());
+        },
+        Modifiers::NONE,
+        Key::C,
+        paints_otherwise,
+    ),
     case(Modifiers::NONE, Key::Num3, |seen, _| seen.zoom = Some(4.0)),
 ];
 

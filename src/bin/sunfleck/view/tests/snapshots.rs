@@ -2,8 +2,9 @@
 
 use eframe::egui;
 use egui::{Key, Modifiers, Rect, pos2};
+use egui_kittest::SnapshotOptions;
 use egui_kittest::kittest::Queryable;
-use egui_kittest::{SnapshotOptions, WgpuTestRenderer};
+use egui_kittest::wgpu::WgpuTestRenderer;
 
 use super::Window;
 use crate::view::engine::Comparison;
