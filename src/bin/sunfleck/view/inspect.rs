@@ -152,6 +152,14 @@ fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
     } else if painted.painting.view == View::Variance && painted.frame.film.n_iterations < 2 {
         ui.weak("One iteration has no variance yet.");
     }
+    if let (true, Some(insides)) = (painted.painting.view.needs_photons(), &painted.frame.insides) {
+        let text = match (painted.painting.view, insides.split.n_iterations) {
+            (View::NodesVisited, _) => "Of the last iteration".to_owned(),
+            (_, 1) => "Of one iteration".to_owned(),
+            (_, n) => format!("Mean of {n} iterations"),
+        };
+        ui.weak(text).on_hover_text("Iterations are looked into while a view or photons that need it are on");
+    }
     if let Some(legend) = &painted.legend {
         let unit = unit(painted);
         let map = |t: f32| match legend.signed {
@@ -284,7 +292,7 @@ pub fn row(ui: &mut egui::Ui, name: &str, value: Option<String>, text: &str) {
 }
 
 pub fn table(ui: &mut egui::Ui, name: &str, rows: impl FnOnce(&mut egui::Ui)) {
-    egui::Grid::new(name).num_columns(2).spacing([8.0, 2.0]).show(ui, rows);
+    egui::Grid::new(name).num_columns(2).min_row_height(15.0).min_col_width(86.0).spacing([8.0, 2.0]).show(ui, rows);
 }
 
 /// Of the pixel under the cursor.
