@@ -212,7 +212,10 @@ pub fn run(shared: &Shared) {
         shared.update(|board| {
             let measured = painted.figures.map(|figures| figures.rel_mse);
             let is_same_reference = same(reference.as_ref(), board.reference.as_ref());
-            board.painted = Some(painted);
+            // Not of a scene that was closed meanwhile.
+            if board.frame.is_some() {
+                board.painted = Some(painted);
+            }
             if frame.estimate == board.estimate && !frame.is_preview {
                 push(&mut board.history.estimated, frame.film.n_iterations, estimated);
                 if is_same_reference {
@@ -284,6 +287,8 @@ impl Painter {
     }
 
     fn paint(&mut self, frame: &Arc<Frame>, reference: Option<Arc<Reference>>, painting: Painting) -> Painted {
+        // A scene that is gone keeps no memory.
+        self.hits = self.hits.take().filter(|(of, _)| Arc::ptr_eq(&of.scene, &frame.scene));
         let picture = frame.picture();
         let exposure = painting.look.exposure_of(&picture.rgb);
         let tonemap = painting.look.tonemap;

@@ -107,7 +107,10 @@ impl Have {
         let before = std::mem::replace(&mut self.wanted, wanted.clone());
         if is_other_scene {
             (self.session, self.opened) = (None, None);
-            shared.update(|board| (board.opened, board.frame, board.phase) = (None, None, Phase::Loading));
+            shared.update(|board| {
+                (board.opened, board.frame, board.painted) = (None, None, None);
+                board.phase = Phase::Loading;
+            });
             let Some(choice) = &wanted.scene else {
                 shared.update(|board| board.phase = Phase::Empty);
                 return Ok(());
