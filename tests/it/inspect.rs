@@ -28,6 +28,7 @@ fn floor(y: f32, material: usize) -> Mesh {
 /// A ball over a floor, and a lamp above that is a point.
 fn ball(material: Material) -> Scene {
     let light = PunctualLight {
+        name: String::new(),
         position: Vec3::new(0.3, 3.0, 0.0),
         direction: Vec3::NEG_Y,
         intensity: Vec3::splat(10.0),

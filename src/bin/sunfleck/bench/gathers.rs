@@ -66,17 +66,16 @@ impl<'a> Input<'a> {
         self.most
     }
 
-    /// The paper's rival: a kd-tree fills buffers, which are read afterwards.
-    pub fn kd_buffered(&self) -> Result<Gathered> {
+    /// The paper's rival: a kd-tree fills `buffers`, which are read afterwards and kept from iteration to iteration.
+    pub fn kd_buffered(&self, buffers: &mut Buffers) -> Result<Gathered> {
         let (tree, build) = timed(|| KdBuffered::new(&self.points, self.most));
         let tree = tree?;
         let part = (MOST_BUFFERED / (RESULT * self.most.max(1))).clamp(1, self.queries.len().max(1));
-        let mut buffers = Buffers::default();
         let (found, gather) = timed(|| -> Result<Vec<Vec3>> {
             let mut found = Vec::with_capacity(self.queries.len());
             for first in (0..self.queries.len()).step_by(part) {
                 let range = first..(first + part).min(self.queries.len());
-                tree.fill(&self.queries[range.clone()], Radii::Each(&self.radii[range.clone()]), &mut buffers)?;
+                tree.fill(&self.queries[range.clone()], Radii::Each(&self.radii[range.clone()]), buffers)?;
                 buffers.check()?;
                 found.par_extend(range.clone().into_par_iter().with_min_len(256).map(|query| {
                     let mut estimate = self.estimate(query);

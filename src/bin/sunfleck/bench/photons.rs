@@ -20,6 +20,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use serde_json::json;
+use sunfleck::index::Buffers;
 use sunfleck::layout::Frame;
 use sunfleck::ppm::{Params, Stages};
 use sunfleck::scene::settings::parse_count;
@@ -231,6 +232,7 @@ struct Runner {
     /// The renderer's first, then the others.
     cells: Vec<Cell>,
     first_radii: Vec<f32>,
+    buffers: Buffers,
 }
 
 /// All backends and methods on one scene and number of paths, in turns.
@@ -261,7 +263,7 @@ fn measure(
         };
         let cell = |&method: &Method| Cell::new(name, paths, backend, stages.device(), method);
         let cells = methods.iter().map(cell).collect();
-        runners.push(Runner { stages, cells, first_radii });
+        runners.push(Runner { stages, cells, first_radii, buffers: Buffers::default() });
     }
     for i in 0..=plan.iterations {
         // The first one is run twice: once to warm up.
@@ -278,7 +280,7 @@ fn measure(
 
 impl Runner {
     fn iterate(&mut self, scene: &PackedScene, frame: &Frame, counts: bool) -> Result<()> {
-        let Self { stages, cells, first_radii } = self;
+        let Self { stages, cells, first_radii, buffers } = self;
         stages.trace_eye(frame)?;
         stages.trace_photons(frame)?;
         let (built, build) = timed(|| stages.build_index(frame));
@@ -309,7 +311,7 @@ impl Runner {
         let input = gathers::Input::new(scene, frame, &photons, &vertices, first_radii)?;
         for cell in &mut cells[1..] {
             let Gathered { build, gather, radiance } = match cell.method {
-                Method::KdBuffered => input.kd_buffered()?,
+                Method::KdBuffered => input.kd_buffered(buffers)?,
                 _ => input.boxes_in_place()?,
             };
             gathers::check(cell.method.name(), &radiance, &right)?;
