@@ -343,8 +343,7 @@ impl Viewer {
             self.title.clone_from(&title);
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Title(title));
         }
-        if let Some(dropped) = ui.input(|i| i.raw.dropped_files.iter().find_map(|file| Some(file.path().to_path_buf())))
-        {
+        if let Some(dropped) = ui.input(|i| i.raw.dropped_files.first().map(|file| file.path().to_path_buf())) {
             files::dropped(ui, self, &dropped);
         }
     }

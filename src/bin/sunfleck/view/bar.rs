@@ -66,7 +66,16 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
             ui.checkbox(&mut remembered.show_inspect, "Inspect").on_hover_text("F2");
             ui.checkbox(&mut remembered.show_convergence, "Convergence").on_hover_text("F3");
             ui.separator();
-            egui::widgets::global_theme_preference_buttons(ui);
+            let theme = ui.ctx().options(|options| options.theme_preference);
+            for (preference, name) in [
+                (egui::ThemePreference::Dark, "Dark"),
+                (egui::ThemePreference::Light, "Light"),
+                (egui::ThemePreference::System, "As the system"),
+            ] {
+                if ui.radio(theme == preference, name).on_hover_text("Colours of the window").clicked() {
+                    ui.ctx().set_theme(preference);
+                }
+            }
         });
         if ui.button("Help").on_hover_text("Keys and mouse (?)").clicked() {
             viewer.show_help ^= true;

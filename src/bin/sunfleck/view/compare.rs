@@ -168,7 +168,8 @@ pub fn section(ui: &mut egui::Ui, viewer: &mut Viewer) {
 /// Over the picture at `rect`.
 pub fn overlay(ui: &egui::Ui, viewer: &mut Viewer, painter: &egui::Painter, rect: Rect) {
     let Some(painted) = viewer.picture.painted().cloned() else { return };
-    let Some((reference, rgba)) = &painted.reference else { return };
+    let Some((reference, _)) = &painted.reference else { return };
+    let Some((size, rgba)) = painted.reference_texture() else { return };
     let visible = rect.intersect(painter.clip_rect());
     let is_held = is_asked_for(ui, visible);
     let is_wiped = painted.painting.comparison == Comparison::Wipe;
@@ -178,7 +179,7 @@ pub fn overlay(ui: &egui::Ui, viewer: &mut Viewer, painter: &egui::Painter, rect
     let view = &mut viewer.compare;
     let made = Made::of(&painted, reference);
     if !view.texture.as_ref().is_some_and(|(of, _)| of.is(&made)) {
-        let image = egui::ColorImage::from_rgba_unmultiplied(painted.size, rgba);
+        let image = egui::ColorImage::from_rgba_unmultiplied(size, rgba);
         let options = egui::TextureOptions { magnification: egui::TextureFilter::Nearest, ..Default::default() };
         view.texture = Some((made, ui.ctx().load_texture("reference", image, options)));
     }

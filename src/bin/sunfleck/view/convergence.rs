@@ -270,7 +270,8 @@ fn curves(kind: Kind, sample: &Sample, alpha: f64, by_seconds: bool) -> Vec<Curv
             vec![rate("emitted", |r| r.n_paths), rate("stored", |r| r.n_photons)]
         }
         Kind::Stages => {
-            let stages: [(&str, fn(&StageTimes) -> f64); 5] = [
+            type Stage = (&'static str, fn(&StageTimes) -> f64);
+            let stages: [Stage; 5] = [
                 ("eye", |t| t.eye),
                 ("photons", |t| t.photons),
                 ("build", |t| t.build),

@@ -53,7 +53,7 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer) {
     }
     ui.painter().rect_filled(ui.max_rect(), 0.0, ui.visuals().panel_fill);
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        let width = (ui.available_width() - 48.0).min(MOST_WIDTH).max(200.0);
+        let width = (ui.available_width() - 48.0).clamp(200.0, MOST_WIDTH);
         let margin = ((ui.available_width() - width) / 2.0).max(8.0);
         ui.horizontal_top(|ui| {
             ui.spacing_mut().item_spacing.x = 0.0;
