@@ -10,9 +10,10 @@ use sunfleck::output::difference::Measure;
 use sunfleck::output::tonemap::ToneMap;
 
 use super::app::Viewer;
+use super::charts::short;
 use super::engine::{Comparison, Message, Painted, Reference, View};
 use super::files;
-use super::inspect::{row, short, table};
+use super::inspect::{row, table};
 
 /// Half the width of what the line of the wipe is held by, points.
 const HOLD: f32 = 6.0;

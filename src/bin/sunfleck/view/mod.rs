@@ -5,6 +5,7 @@
 mod app;
 mod bar;
 mod camera;
+mod charts;
 mod compare;
 mod convergence;
 mod engine;

@@ -14,6 +14,8 @@ use sunfleck::output::display::{self, Look};
 use sunfleck::output::false_colour::{self, Scale};
 use sunfleck::output::flip::{self, flip};
 use sunfleck::output::histogram::Histogram;
+use sunfleck::output::tonemap::srgb_encode;
+use sunfleck::ppm::film::luminance;
 
 use super::{Frame, Reference};
 
@@ -324,14 +326,20 @@ impl Painter {
             View::Stops => {
                 let mut rgba = vec![];
                 false_colour::luminance_in_stops(&picture.rgb, exposure, STOPS, &mut rgba);
+                let stops = |&rgb: &[f32; 3]| (luminance(rgb).max(0.0) / false_colour::MID_GREY).log2() + exposure;
+                let values = Values::Scalar(Arc::new(picture.rgb.iter().map(stops).collect()));
                 let legend = Some(Legend { range: STOPS, log: false, signed: false });
-                Colours { rgba, values: Values::Rgb(Arc::new(picture.rgb)), legend, mean: None }
+                Colours { rgba, values, legend, mean: None }
             }
             View::Direct => lit(part(|p| p.direct), picture),
             View::Caustic => lit(part(|p| p.caustic), picture),
             View::Indirect => lit(part(|p| p.indirect), picture),
-            View::Albedo => plain(self.hits(frame).base_colors(), |c| c),
-            View::Normal => plain(self.hits(frame).normals(), |c| 0.5 * c + 0.5),
+            View::Albedo => plain(self.hits(frame).base_colors(), |rgb| rgb.map(srgb_encode)),
+            // As in normal maps; black where nothing is hit.
+            View::Normal => plain(self.hits(frame).normals(), |n| match n {
+                [0.0, 0.0, 0.0] => n,
+                _ => n.map(|c| 0.5 * c + 0.5),
+            }),
             View::Depth => {
                 let mut colours = scalar(self.hits(frame).depths(), false);
                 far(&mut colours);
@@ -404,7 +412,9 @@ fn compared(
                 let most = false_colour::signed(&image.values, None, &mut rgba);
                 Legend { range: [-most, most], log: false, signed: true }
             } else {
-                let range = false_colour::scalar(&image.values, &Scale { range: None, log: false }, &mut rgba);
+                // Black is no difference.
+                let range = [0.0, false_colour::automatic_range(&image.values, false)[1]];
+                let range = false_colour::scalar(&image.values, &Scale { range: Some(range), log: false }, &mut rgba);
                 Legend { range, log: false, signed: false }
             };
             (image.values, legend, image.mean)
@@ -438,10 +448,9 @@ fn far(colours: &mut Colours) {
     }
 }
 
-/// Numbers in [0, 1] as they are.
-fn plain(values: Vec<[f32; 3]>, shown: fn(f32) -> f32) -> Colours {
-    use sunfleck::output::tonemap::srgb_encode;
-    let byte = |c: f32| (255.0 * srgb_encode(shown(c).clamp(0.0, 1.0)) + 0.5) as u8;
-    let rgba = values.iter().flat_map(|&[r, g, b]| [byte(r), byte(g), byte(b), 255]).collect();
+/// Three numbers as the colour that `encoded` makes of them, in [0, 1].
+fn plain(values: Vec<[f32; 3]>, encoded: fn([f32; 3]) -> [f32; 3]) -> Colours {
+    let byte = |c: f32| (255.0 * c.clamp(0.0, 1.0) + 0.5) as u8;
+    let rgba = values.iter().map(|&v| encoded(v).map(byte)).flat_map(|[r, g, b]| [r, g, b, 255]).collect();
     Colours { rgba, values: Values::Rgb(Arc::new(values)), legend: None, mean: None }
 }
