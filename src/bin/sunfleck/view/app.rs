@@ -69,6 +69,8 @@ pub struct Viewer {
     pub previous: Option<Arc<Choice>>,
     /// Of a texture, pixels.
     most_side: usize,
+    /// Of the window.
+    title: String,
     /// With the times they appeared.
     messages: Vec<(f64, Message)>,
     pub show_help: bool,
@@ -101,6 +103,7 @@ impl Viewer {
             timing: Default::default(),
             previous: None,
             most_side: 0,
+            title: String::new(),
             messages: vec![],
             show_help: false,
             dialog: None,
@@ -335,7 +338,9 @@ impl Viewer {
             }
             None => "Sunfleck".to_owned(),
         };
-        if ui.input(|i| i.viewport().title.as_ref() != Some(&title)) {
+        // Under X11 the window cannot be asked for its title, and each of these makes another frame.
+        if self.title != title {
+            self.title.clone_from(&title);
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Title(title));
         }
         if let Some(dropped) = ui.input(|i| i.raw.dropped_files.iter().find_map(|file| Some(file.path().to_path_buf())))

@@ -311,6 +311,7 @@ fn log_marks(input: GridInput) -> Vec<GridMark> {
             };
             GridMark { value: f64::from(decade) + f64::from(digit).log10(), step_size }
         })
+        .filter(|mark| (input.bounds.0..=input.bounds.1).contains(&mark.value))
         .collect()
 }
 
@@ -410,8 +411,8 @@ mod tests {
             marks.iter().filter(|m| is_labelled(m.value, &range)).map(|m| small_number(10f64.powf(m.value))).collect()
         };
         let [wide, near]: [Vec<String>; 2] = [-0.2..=1.5, 0.0..=1.2].map(labels);
-        assert_eq!(wide, ["0.1", "1", "10"]);
-        assert_eq!(near, ["0.1", "0.2", "0.5", "1", "2", "5", "10", "20", "50"]);
+        assert_eq!(wide, ["1", "10"]);
+        assert_eq!(near, ["1", "2", "5", "10", "20"]);
         assert!(log_marks(GridInput { bounds: (-1e9, 1e9), base_step_size: 1.0 }).is_empty());
         assert_eq!([1e3, 2e4, 5e6].map(count), ["1000", "20k", "5M"]);
         assert_eq!((Kind::Error.mark(-3.0), Kind::Radius.mark(-3.0)), ("1e-3".to_owned(), "1.00 mm".to_owned()));

@@ -8,6 +8,8 @@ mod history;
 mod paint;
 mod painting;
 mod session;
+#[cfg(test)]
+mod tests;
 mod worker;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
