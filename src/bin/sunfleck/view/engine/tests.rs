@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use sunfleck::cpu::CpuStages;
 use sunfleck::output::exr;
-use sunfleck::ppm::{self, Film};
+use sunfleck::ppm::{self, Film, Stages};
 use sunfleck::scene::PackedScene;
 use sunfleck::scene::settings::CameraSettings;
 
