@@ -71,6 +71,7 @@ while ((SECONDS - began < 60 * minutes)) && alive; do
     scene=$((loads % ${#scenes[@]}))
     if ! switch "$scene"; then
         failed="${scenes[$scene]} does not open; the window is called $(title || true)"
+        command -v import >/dev/null && import -window root soak-viewer-failed.png
         break
     fi
     loads=$((loads + 1))

@@ -73,6 +73,8 @@ impl Window {
             .with_size([1280.0, 720.0])
             .with_step_dt(1.0 / 60.0)
             .with_theme(egui::Theme::Dark)
+            .allow_missing_glyphs()
+            .with_accessibility_check(false)
             .renderer(renderer)
             .build_ui_state(|ui, viewer: &mut Viewer| viewer.show(ui), viewer);
         Self { harness, commands: vec![], copied: vec![], asked, folder }

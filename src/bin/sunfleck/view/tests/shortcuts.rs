@@ -27,7 +27,7 @@ impl Seen {
         let asked = window.asked.lock().unwrap().clone();
         let viewer = window.viewer();
         Self {
-            wanted: viewer.wanted.clone(),
+            wanted: Wanted { moving: false, ..viewer.wanted.clone() },
             settings: viewer.edits.now().as_ref().clone(),
             remembered: viewer.remembered.clone(),
             zoom: viewer.picture.zoom,
