@@ -327,6 +327,7 @@ mod tests {
         assert_eq!((third.params.size, third.params.n_paths), (first.params.size, 5));
         assert_eq!(third.scene.materials[0].roughness, first.scene.materials[0].roughness);
         // Without the scene, and as if with it.
+        let args = InputArgs::default();
         let mut again = prepare(&source, &source.settings, source.scene().unwrap(), &args).unwrap();
         settings.camera = Some(CameraSettings { position: Some([0.5, 1.0, 3.0]), ..CameraSettings::default() });
         for _ in 0..2 {

@@ -169,7 +169,7 @@ fn numbers(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, now: &Settings) {
     let mut longest = now.max_segments.unwrap_or(0);
     let mut changed = false;
     let reset = row(ui, LONGEST, now.max_segments != read.max_segments, |ui| {
-        let drag = egui::DragValue::new(&mut longest).speed(0.1).range(0..=1000).update_while_editing(false);
+        let drag = egui::DragValue::new(&mut longest).speed(1.0).range(0..=1000).update_while_editing(false);
         let drag = drag.custom_formatter(|n, _| if n < 0.5 { "no limit".to_owned() } else { format!("{n:.0}") });
         let response = ui.add_sized(egui::vec2(ui.available_width(), ui.spacing().interact_size.y), drag);
         changed = response.changed();
@@ -185,7 +185,7 @@ fn numbers(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, now: &Settings) {
     let mut seed = now.seed.unwrap_or(0);
     let mut changed = false;
     let reset = row(ui, SEED, now.seed != read.seed, |ui| {
-        let drag = egui::DragValue::new(&mut seed).speed(0.1).update_while_editing(false);
+        let drag = egui::DragValue::new(&mut seed).speed(1.0).update_while_editing(false);
         let response = ui.add_sized(egui::vec2(ui.available_width(), ui.spacing().interact_size.y), drag);
         changed = response.changed();
         response

@@ -155,6 +155,13 @@ impl Window {
         self.steps(3);
     }
 
+    /// The same without the mouse: for what may be scrolled out of sight.
+    fn activate(&mut self, label: &str) {
+        use egui_kittest::kittest::Queryable;
+        self.harness.get_by_label(label).click_accesskit();
+        self.steps(3);
+    }
+
     /// Drops a file on the window.
     fn drop_file(&mut self, path: PathBuf) {
         self.harness.input_mut().dropped_files.push(Arc::new(Dropped(path)));

@@ -224,7 +224,7 @@ const CASES: &[Case] = &[
     case(Modifiers::NONE, Key::G, paints_otherwise),
     after(
         |window| {
-            window.click("Pin");
+            window.activate("Pin");
             window.wait("reference", |viewer| viewer.now.reference.is_some());
         },
         Modifiers::NONE,
