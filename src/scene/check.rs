@@ -24,13 +24,6 @@ impl Scene {
     pub fn check(&self) -> Result<(), SceneError> {
         let n_materials = self.materials.len();
         let n_images = self.images.len();
-        let each = |kind: &str, name: &str, i: usize, problem: Problem| {
-            problem.map_err(|(field, problem)| {
-                let object = if name.is_empty() { format!("{kind} {i}") } else { format!("{kind} {name:?}") };
-                let place = if field.is_empty() { object } else { format!("{object}: {field}") };
-                SceneError { place, problem }
-            })
-        };
         for (i, mesh) in self.meshes.iter().enumerate() {
             each("mesh", &mesh.name, i, check_mesh(mesh, n_materials))?;
         }
@@ -63,6 +56,22 @@ impl Scene {
         };
         Err(SceneError { place: "scene".into(), problem })
     }
+}
+
+impl Camera {
+    /// The same for a camera by itself.
+    pub fn check(&self) -> Result<(), SceneError> {
+        each("camera", &self.name, 0, check_camera(self))
+    }
+}
+
+/// Says where a problem is.
+fn each(kind: &str, name: &str, i: usize, problem: Problem) -> Result<(), SceneError> {
+    problem.map_err(|(field, problem)| {
+        let object = if name.is_empty() { format!("{kind} {i}") } else { format!("{kind} {name:?}") };
+        let place = if field.is_empty() { object } else { format!("{object}: {field}") };
+        SceneError { place, problem }
+    })
 }
 
 fn require(condition: bool, field: &'static str, problem: impl FnOnce() -> String) -> Problem {

@@ -108,16 +108,25 @@ fn points(scene: &Scene, with_inward: bool) -> impl Iterator<Item = (Vec3, f32)>
     vertices.map(|p| (p, 0.0)).chain(spheres.map(|s| (s.centre, s.radius)))
 }
 
-/// Centre of the bounding box of everything and the radius that reaches every point.
-fn bounding_sphere(scene: &Scene, with_inward: bool) -> Option<(Vec3, f32)> {
+impl Scene {
+    /// Least and greatest corner of all surfaces, metres; those of a cube of side 1 about the origin if there are none.
+    pub fn bounds(&self) -> [Vec3; 2] {
+        bounding_box(self, true).unwrap_or([Vec3::splat(-0.5), Vec3::splat(0.5)])
+    }
+}
+
+fn bounding_box(scene: &Scene, with_inward: bool) -> Option<[Vec3; 2]> {
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for (p, radius) in points(scene, with_inward) {
         low = low.min(p - radius);
         high = high.max(p + radius);
     }
-    if !(low.is_finite() && high.is_finite()) {
-        return None;
-    }
+    (low.is_finite() && high.is_finite()).then_some([low, high])
+}
+
+/// Centre of the bounding box of everything and the radius that reaches every point.
+fn bounding_sphere(scene: &Scene, with_inward: bool) -> Option<(Vec3, f32)> {
+    let [low, high] = bounding_box(scene, with_inward)?;
     let centre = 0.5 * (low + high);
     let reach = points(scene, with_inward).map(|(p, radius)| p.distance(centre) + radius).fold(0.0, f32::max);
     Some((centre, reach))

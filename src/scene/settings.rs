@@ -135,7 +135,7 @@ pub struct CameraSettings {
     pub focus_distance: Option<f32>,
 }
 
-/// The environment: a file, or one colour all around.
+/// The environment: a file, or one colour all around; without either, the scene's own, changed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct EnvironmentSettings {

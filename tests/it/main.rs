@@ -30,3 +30,5 @@ mod points;
 mod reference;
 #[cfg(feature = "render")]
 mod sampling;
+#[cfg(all(feature = "view", target_os = "linux"))]
+mod viewer;

@@ -44,6 +44,18 @@ Examples:
 
 Exit codes: 0 done, 1 error, 2 wrong usage, 130 interrupted and saved (a second Ctrl-C aborts at once).";
 
+#[cfg(feature = "view")]
+const VIEW_EXAMPLES: &str = "\
+Examples:
+  sunfleck view
+      The scenes that come with sunfleck, and recent files.
+  sunfleck view my.glb -o my.exr
+      A file of yours; Ctrl+S saves my.exr.
+  sunfleck view glass --set photons=2M --iterations 100
+      A shipped scene with settings of yours; it pauses after 100 iterations.
+
+Keys and mouse: press ? in the window.";
+
 /// Renders scenes by progressive photon mapping: caustics through glass and water converge.
 #[derive(Debug, Parser)]
 #[command(name = "sunfleck", version = VERSION, after_help = EXAMPLES, max_term_width = 110)]
@@ -61,6 +73,9 @@ pub struct Cli {
 pub enum Command {
     /// Render a scene
     Render(Box<RenderArgs>),
+    /// Watch a scene converge in a window, and turn it
+    #[cfg(feature = "view")]
+    View(ViewArgs),
     /// List the scenes that come with sunfleck
     Scenes,
     /// Write a scene as .glb, for other programs
@@ -121,6 +136,21 @@ pub struct RenderArgs {
     #[arg(long, value_name = "KEY=VALUE", help_heading = "Estimator")]
     pub set: Vec<String>,
 
+    #[command(flatten)]
+    pub device: DeviceArgs,
+
+    /// Say nothing but errors
+    #[arg(short, long, conflicts_with = "verbose", help_heading = "Messages")]
+    pub quiet: bool,
+
+    /// Say more: the scene, the radii, where the time went
+    #[arg(short, long, help_heading = "Messages")]
+    pub verbose: bool,
+}
+
+/// What computes.
+#[derive(Clone, Debug, Args)]
+pub struct DeviceArgs {
     /// Where to compute; auto: a real GPU, else the CPU (software adapters only when named)
     #[arg(long, value_parser = ["auto", "gpu", "cpu"], default_value = "auto", help_heading = "Device")]
     pub backend: String,
@@ -136,14 +166,46 @@ pub struct RenderArgs {
     /// CPU threads [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Device")]
     pub threads: Option<u16>,
+}
 
-    /// Say nothing but errors
-    #[arg(short, long, conflicts_with = "verbose", help_heading = "Messages")]
-    pub quiet: bool,
+#[cfg(feature = "view")]
+#[derive(Debug, Args)]
+#[command(after_help = VIEW_EXAMPLES)]
+pub struct ViewArgs {
+    /// .glb, .gltf or .obj file, .toml settings file, or the name of a scene that comes with sunfleck [default: start page]
+    #[arg(value_name = "SCENE")]
+    pub scene: Option<String>,
 
-    /// Say more: the scene, the radii, where the time went
-    #[arg(short, long, help_heading = "Messages")]
-    pub verbose: bool,
+    /// Where saving puts the picture without asking: .exr or .png
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+
+    /// Picture to compare with and to measure errors against, .exr
+    #[arg(long, value_name = "FILE")]
+    pub reference: Option<PathBuf>,
+
+    /// Pause after so many iterations
+    #[arg(long, visible_alias = "spp", value_name = "N", allow_hyphen_values = true, value_parser = parse_count)]
+    pub iterations: Option<u32>,
+
+    /// Pause after so many seconds of iterations
+    #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = positive_f64)]
+    pub seconds: Option<f64>,
+
+    /// Pause once the estimated relMSE is no more than this
+    #[arg(long, value_name = "RELMSE", allow_hyphen_values = true, value_parser = positive_f64)]
+    pub noise: Option<f64>,
+
+    /// Camera to begin with, by name [default: the first]
+    #[arg(long, value_name = "NAME")]
+    pub camera: Option<String>,
+
+    /// Override a key of the settings file, such as photons=2M; repeatable
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+
+    #[command(flatten)]
+    pub device: DeviceArgs,
 }
 
 /// What is said over the settings of a scene: picture and estimator.

@@ -10,7 +10,7 @@ use sunfleck::gpu::{self, Choice, Context, GpuStages, Method};
 use sunfleck::ppm::Stages;
 use sunfleck::scene::PackedScene;
 
-use crate::cli::{RenderArgs, Usage};
+use crate::cli::{DeviceArgs, Usage};
 use crate::job::Input;
 use crate::progress::Progress;
 
@@ -28,7 +28,7 @@ pub fn use_threads(threads: Option<u16>) -> Result<()> {
 }
 
 /// Opens what was asked for.
-pub fn open(args: &RenderArgs, progress: &Progress) -> Result<Device> {
+pub fn open(args: &DeviceArgs, progress: &Progress) -> Result<Device> {
     if args.backend != "cpu" {
         return open_gpu(args, progress);
     }
@@ -69,7 +69,7 @@ pub fn has_real_gpu() -> bool {
 }
 
 #[cfg(not(feature = "gpu"))]
-fn open_gpu(args: &RenderArgs, _: &Progress) -> Result<Device> {
+fn open_gpu(args: &DeviceArgs, _: &Progress) -> Result<Device> {
     match args.backend == "gpu" || args.device.is_some() || args.index != "tree" {
         true => bail!("this sunfleck was built without the GPU backend"),
         false => Ok(Device::Cpu),
@@ -77,7 +77,7 @@ fn open_gpu(args: &RenderArgs, _: &Progress) -> Result<Device> {
 }
 
 #[cfg(feature = "gpu")]
-fn open_gpu(args: &RenderArgs, progress: &Progress) -> Result<Device> {
+fn open_gpu(args: &DeviceArgs, progress: &Progress) -> Result<Device> {
     let devices = gpu::list_devices();
     let method = if args.index == "hardware" { Method::Hardware } else { Method::Tree };
     let choice = match &args.device {
@@ -123,6 +123,31 @@ impl Device {
         }
     }
 
+    /// Whether it has failed for good.
+    #[cfg(feature = "view")]
+    pub fn is_lost(&self) -> bool {
+        match self {
+            Self::Cpu => false,
+            Self::Gpu(context, _) => context.check().is_err(),
+        }
+    }
+
+    /// The same adapter, opened once more.
+    #[cfg(feature = "view")]
+    pub fn reopen(&self) -> Result<Self> {
+        Ok(match self {
+            Self::Cpu => Self::Cpu,
+            Self::Gpu(context, method) => {
+                let choice = Choice::Index(context.info().index);
+                let context = match method {
+                    Method::Tree => Context::new(&choice)?,
+                    Method::Hardware => Context::with_ray_queries(&choice)?,
+                };
+                Self::Gpu(Arc::new(context), *method)
+            }
+        })
+    }
+
     /// What the adapter is called, if this is one.
     pub fn gpu_name(&self) -> Option<String> {
         match self {
@@ -134,14 +159,27 @@ impl Device {
 
     /// Takes the scene to the device.
     pub fn stages(&self, input: &Input) -> Result<Box<dyn Stages>> {
+        self.stages_of(Arc::new(PackedScene::new(&input.scene)), input, None)
+    }
+
+    /// The same with the scene packed already. A dispatch on a graphics card is to take `dispatch_seconds` at most.
+    pub fn stages_of(
+        &self,
+        scene: Arc<PackedScene>,
+        input: &Input,
+        dispatch_seconds: Option<f64>,
+    ) -> Result<Box<dyn Stages>> {
         let params = &input.params;
-        let scene = Arc::new(PackedScene::new(&input.scene));
         let camera = input.camera.pack(params.size[0], params.size[1]);
         Ok(match self {
             Self::Cpu => Box::new(CpuStages::new(scene, camera, params.film_size())),
             #[cfg(feature = "gpu")]
             Self::Gpu(context, method) => {
-                Box::new(GpuStages::with_method(Arc::clone(context), &scene, camera, *method)?)
+                let mut stages = GpuStages::with_method(Arc::clone(context), &scene, camera, *method)?;
+                if let Some(seconds) = dispatch_seconds.filter(|_| context.info().is_real()) {
+                    stages.set_dispatch_seconds(seconds);
+                }
+                Box::new(stages)
             }
         })
     }

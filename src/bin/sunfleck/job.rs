@@ -121,10 +121,24 @@ pub fn prepare(source: &Source, settings: &Settings, mut loaded: Loaded, args: &
     Ok(Input { scene, camera, params, warnings })
 }
 
+/// The same for settings that change the scene as those did that `input` was made with; `as_read` is the scene before
+/// them. Nothing is copied: the camera may move at every frame of a window.
+#[cfg(feature = "view")]
+pub fn prepare_again(input: &mut Input, settings: &Settings, as_read: &Scene) -> Result<()> {
+    let cameras = match as_read.cameras.is_empty() {
+        true => vec![default_camera(&input.scene)],
+        false => as_read.cameras.clone(),
+    };
+    let camera = settings.camera_of(&Scene { cameras, ..Scene::default() })?;
+    camera.check()?;
+    input.params = params(settings, &InputArgs::default(), &camera)?;
+    input.camera = camera;
+    Ok(())
+}
+
 /// The command line over the settings over the defaults.
 fn params(settings: &Settings, args: &InputArgs, camera: &Camera) -> Result<Params> {
-    let size = args.resolution.or(settings.size.map(|size| size.0));
-    let [width, height] = size.unwrap_or_else(|| default_size(camera));
+    let [width, height] = args.resolution.unwrap_or_else(|| size(settings, camera));
     let mut params = Params::new(width, height);
     if args.paper {
         use_paper_mode(&mut params);
@@ -177,7 +191,11 @@ fn direct(direct: settings::Direct) -> Direct {
     }
 }
 
-fn default_size(camera: &Camera) -> [u32; 2] {
+/// Of the picture, pixels: as the settings say, else as the camera.
+pub fn size(settings: &Settings, camera: &Camera) -> [u32; 2] {
+    if let Some(size) = settings.size {
+        return size.0;
+    }
     let [width, height] = DEFAULT_SIZE;
     match camera.aspect {
         Some(aspect) => [(aspect * height as f32).round().clamp(1.0, 16_384.0) as u32, height],
@@ -196,16 +214,28 @@ fn camera(scene: &Scene, wanted: Option<&str>) -> Result<Camera> {
     })
 }
 
+/// Refuses a picture that could not be written later.
+#[cfg(feature = "view")]
+pub fn check_output(path: &Path) -> Result<()> {
+    check_format(path)?;
+    Ok(atomic::check(path)?)
+}
+
+fn check_format(path: &Path) -> Result<()> {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    if !matches!(extension.as_deref(), Some("exr" | "png")) {
+        bail!(Usage(format!("-o {}: a picture ends in .exr or .png", path.display())));
+    }
+    Ok(())
+}
+
 /// Refuses what could not be written later, or would overwrite what is read.
 fn check_outputs(args: &RenderArgs) -> Result<()> {
     if args.output.is_empty() && args.json.is_none() {
         bail!(Usage("nowhere to put the picture: add -o out.png or -o out.exr".into()));
     }
     for path in &args.output {
-        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-        if !matches!(extension.as_deref(), Some("exr" | "png")) {
-            bail!(Usage(format!("-o {}: a picture ends in .exr or .png", path.display())));
-        }
+        check_format(path)?;
     }
     let files: Vec<_> = args.output.iter().chain(&args.json).collect();
     for (i, path) in files.iter().enumerate() {
@@ -271,7 +301,7 @@ fn available_memory() -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sunfleck::scene::settings::{Count, Size};
+    use sunfleck::scene::settings::{CameraSettings, Count, Size};
 
     /// As a window needs it: the file is read once, the settings change.
     #[test]
@@ -279,6 +309,7 @@ mod tests {
         let source = Source::resolve("cornell").unwrap();
         let loaded = source.scene().unwrap();
         let args = InputArgs::default();
+        let as_read = loaded.scene.clone();
         let first = prepare(&source, &source.settings, loaded.clone(), &args).unwrap();
         let mut settings = source.settings.clone();
         settings.size = Some(Size([32, 16]));
@@ -295,6 +326,20 @@ mod tests {
         let third = prepare(&source, &source.settings, loaded, &args).unwrap();
         assert_eq!((third.params.size, third.params.n_paths), (first.params.size, 5));
         assert_eq!(third.scene.materials[0].roughness, first.scene.materials[0].roughness);
+        // Without the scene, and as if with it.
+        let args = InputArgs::default();
+        let mut again = prepare(&source, &source.settings, source.scene().unwrap(), &args).unwrap();
+        settings.camera = Some(CameraSettings { position: Some([0.5, 1.0, 3.0]), ..CameraSettings::default() });
+        for _ in 0..2 {
+            prepare_again(&mut again, &settings, &as_read).unwrap();
+            let whole = prepare(&source, &settings, source.scene().unwrap(), &args).unwrap();
+            assert_eq!((again.params.size, again.params.n_paths), (whole.params.size, whole.params.n_paths));
+            assert_eq!(again.camera.pack(4, 3), whole.camera.pack(4, 3));
+            settings.camera = None;
+        }
+        settings.alpha = Some(2.0);
+        assert!(prepare_again(&mut again, &settings, &as_read).is_err());
+        settings.alpha = None;
         settings.set("material.none.ior=2").unwrap();
         let error = prepare(&source, &settings, source.scene().unwrap(), &args).err().map(|e| crate::chain(&e));
         assert!(

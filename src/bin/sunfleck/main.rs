@@ -11,9 +11,8 @@ mod render;
 mod report;
 mod scenes;
 mod stop;
-#[cfg(test)] // Until the window uses it.
-#[path = "view/camera.rs"]
-mod view_camera;
+#[cfg(feature = "view")]
+mod view;
 
 use std::process::ExitCode;
 
@@ -28,6 +27,7 @@ sunfleck renders light: caustics included, from a scene file to a picture.
 
   sunfleck render glass -o glass.png         a scene that comes with it
   sunfleck render my.glb -o my.exr -o my.png one of yours: .glb .gltf .obj
+  sunfleck view                              the same in a window, converging
   sunfleck scenes                            the scenes that come with it
   sunfleck render --help                     everything else";
 
@@ -39,6 +39,8 @@ fn main() -> ExitCode {
     let done = match (&cli.command, cli.list_devices) {
         (_, true) => devices::list(),
         (Some(Command::Render(args)), _) => render::run(args),
+        #[cfg(feature = "view")]
+        (Some(Command::View(args)), _) => view::run(args),
         (Some(Command::Scenes), _) => scenes::list(),
         (Some(Command::Export(args)), _) => scenes::export(args),
         (Some(Command::Compare(args)), _) => compare::run(args),

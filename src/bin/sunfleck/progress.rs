@@ -123,7 +123,7 @@ pub fn length(metres: f32) -> String {
     }
 }
 
-fn with_prefix(x: f64) -> String {
+pub fn with_prefix(x: f64) -> String {
     match x {
         x if x >= 1e9 => format!("{} G", three_digits(x / 1e9)),
         x if x >= 1e6 => format!("{} M", three_digits(x / 1e6)),

@@ -21,10 +21,10 @@ const SNAPSHOT_EVERY: Duration = Duration::from_secs(30);
 pub fn run(args: &RenderArgs) -> Result<ExitCode> {
     let stop = Stop::install()?;
     let job = Job::resolve(args)?; // what is to be done, and that its outputs can be written
-    devices::use_threads(args.threads)?;
+    devices::use_threads(args.device.threads)?;
     let mut seconds = Seconds::default();
     let mut progress = Progress::new(args.quiet);
-    let device = timed(&mut seconds.open, || devices::open(args, &progress))?;
+    let device = timed(&mut seconds.open, || devices::open(&args.device, &progress))?;
     let input = timed(&mut seconds.load, || job.load(args))?; // file → scene, camera, parameters
     input.warnings.iter().for_each(|warning| progress.say(&format!("sunfleck: warning: {}", crate::one_line(warning))));
     let mut stages = timed(&mut seconds.prepare, || device.stages(&input))?; // scene → device's memory

@@ -14,6 +14,7 @@ use sunfleck::scene::shipped::{NAMES, shipped};
 use crate::cli::{ExportArgs, Usage};
 
 /// What SCENE stands for.
+#[derive(Clone, Debug)]
 pub struct Source {
     /// As given.
     pub name: String,
@@ -56,6 +57,18 @@ impl Source {
             return Ok(Loaded { scene, warnings: vec![] });
         }
         Ok(load(&self.file)?)
+    }
+
+    /// Settings for a file that lies anywhere: what they name is found from there.
+    #[cfg(feature = "view")]
+    pub fn rooted(&self, settings: &Settings) -> Settings {
+        let mut settings = settings.clone();
+        let absolute = |path: &Path| path.canonicalize().ok().map(|path| path.to_string_lossy().into_owned());
+        settings.scene = absolute(&self.file).or_else(|| Some(self.file.to_string_lossy().into_owned()));
+        if let Some(file) = settings.environment.as_mut().and_then(|environment| environment.file.as_mut()) {
+            *file = absolute(&self.folder.join(&*file)).unwrap_or_else(|| file.clone());
+        }
+        settings
     }
 
     /// Changes a scene as `settings` say, whose files lie where the settings file does.
@@ -104,7 +117,8 @@ pub fn list() -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn describe(name: &str) -> &'static str {
+/// A shipped scene in one line.
+pub fn describe(name: &str) -> &'static str {
     match name {
         "cornell" => "the box with a red and a green wall, a mirror ball and a glass ball",
         "glass" => "a goblet of red wine and marbles under a small lamp",

@@ -6,7 +6,8 @@ use super::{
 };
 use crate::scene::load::load_environment;
 use crate::scene::{
-    Camera, Environment, Material, Projection, PunctualKind, PunctualLight, Scene, Sphere, defaults::default_camera,
+    Camera, Environment, Material, Projection, PunctualKind, PunctualLight, Scene, Sphere,
+    defaults::{add_default_light, default_camera},
 };
 use glam::{Affine3A, Vec3};
 use std::path::Path;
@@ -90,9 +91,6 @@ impl Settings {
             camera.check(c);
         }
         if let Some(environment) = &self.environment {
-            c.require(environment.file.is_some() || environment.color.is_some(), "environment", || {
-                "neither file nor color is given".into()
-            });
             c.number("environment.rotation_degrees", environment.rotation_degrees, |_| true, "finite");
             c.not_negative("environment.strength", environment.strength);
             c.color("environment.color", environment.color);
@@ -130,9 +128,7 @@ impl Settings {
         }
         scene.lights.extend(self.lights.iter().enumerate().map(|(i, light)| light.light(i)));
         if let Some(environment) = &self.environment {
-            let (map, mut more) = environment.environment(folder)?;
-            scene.environment = Some(map);
-            warnings.append(&mut more);
+            warnings.extend(environment.apply(scene, folder)?);
         }
         if let Some(factor) = self.light_scale {
             scale_lights(scene, factor);
@@ -153,6 +149,20 @@ fn scale_lights(scene: &mut Scene, factor: f32) {
     }
     if let Some(environment) = &mut scene.environment {
         environment.strength *= factor;
+    }
+}
+
+impl Settings {
+    /// The camera that these settings make of those of `scene`, which is as its file has it.
+    pub fn camera_of(&self, scene: &Scene) -> Result<Camera, SettingsError> {
+        let wrong = |(field, problem): Wrong| SettingsError::Field { field, problem };
+        self.check_values().map_err(wrong)?;
+        let cameras = if scene.cameras.is_empty() { vec![default_camera(scene)] } else { scene.cameras.clone() };
+        let mut cameras = Scene { cameras, ..Scene::default() };
+        if let Some(camera) = &self.camera {
+            camera.apply(&mut cameras).map_err(wrong)?;
+        }
+        Ok(cameras.cameras.swap_remove(0))
     }
 }
 
@@ -231,18 +241,32 @@ fn orient(position: Vec3, forward: Vec3, up: Vec3) -> Affine3A {
 }
 
 impl EnvironmentSettings {
-    fn environment(&self, folder: &Path) -> Result<(Environment, Vec<String>), SettingsError> {
-        let color = self.color.map_or(Vec3::ONE, Vec3::from);
-        let (mut environment, warnings) = match &self.file {
-            Some(file) => load_environment(&folder.join(file))?,
-            None => (Environment::uniform(Vec3::ONE), Vec::new()),
+    /// Returns warnings.
+    fn apply(&self, scene: &mut Scene, folder: &Path) -> Result<Vec<String>, SettingsError> {
+        let mut warnings = Vec::new();
+        let mut environment = match (&self.file, self.color) {
+            (Some(file), _) => {
+                let (environment, more) = load_environment(&folder.join(file))?;
+                warnings.extend(more);
+                environment
+            }
+            (None, Some(_)) => Environment::uniform(Vec3::ONE),
+            (None, None) => {
+                // The sky that a scene without light gets is its own.
+                warnings.extend(add_default_light(scene));
+                scene.environment.take().ok_or_else(|| SettingsError::Field {
+                    field: "environment".into(),
+                    problem: "neither file nor color is given, and the scene has no environment of its own".into(),
+                })?
+            }
         };
-        for texel in &mut environment.texels {
-            *texel *= color;
+        if let Some(color) = self.color.map(Vec3::from) {
+            environment.texels.iter_mut().for_each(|texel| *texel *= color);
         }
-        environment.rotation = self.rotation_degrees.unwrap_or(0.0).to_radians();
-        environment.strength = self.strength.unwrap_or(1.0);
-        Ok((environment, warnings))
+        environment.rotation = self.rotation_degrees.map_or(environment.rotation, f32::to_radians);
+        environment.strength = self.strength.unwrap_or(environment.strength);
+        scene.environment = Some(environment);
+        Ok(warnings)
     }
 }
 

@@ -205,9 +205,10 @@ fn text_is_short() {
     let pairs = ["material.red.roughness=0.2", "material.\"dark red\".roughness=0.4"];
     assert_eq!(tuned.difference(&settings), pairs);
     // What would be refused on the way goes in one piece.
-    let sky = |text| parse(&format!("[environment]\n{text}"));
-    let (colored, mapped) = (sky("color = [1, 1, 1]"), sky("file = \"sky.hdr\""));
-    assert_eq!(mapped.difference(&colored), ["environment={ file = \"sky.hdr\" }"]);
+    let camera = |text| parse(&format!("[camera]\n{text}"));
+    let there = camera("position = [0, 0, 1]\nlook_at = [0, 0, 0]");
+    let back = camera("position = [0, 0, 0]\nlook_at = [0, 0, 1]");
+    assert_eq!(back.difference(&there), ["camera={ look_at = [0.0, 0.0, 1.0], position = [0.0, 0.0, 0.0] }"]);
 }
 
 #[test]
@@ -316,7 +317,7 @@ fn camera() -> impl Strategy<Value = CameraSettings> {
 fn environment() -> impl Strategy<Value = EnvironmentSettings> {
     (of(name()), of(-360.0f32..360.0), of(unit()), color(), any::<bool>()).prop_map(
         |(file, rotation_degrees, strength, color, colored)| {
-            let color = (colored || file.is_none()).then_some(color);
+            let color = colored.then_some(color);
             EnvironmentSettings { file, rotation_degrees, strength, color }
         },
     )

@@ -2,8 +2,9 @@
 
 use super::{Folder, Glb};
 use glam::Vec3;
+use std::f32::consts::PI;
 use sunfleck::scene::settings::{Count, FirstRadius, Kernel, Settings, Size};
-use sunfleck::scene::{AlphaMode, Projection, PunctualKind, Scene};
+use sunfleck::scene::{AlphaMode, Environment, Material, Projection, PunctualKind, Scene};
 
 const FULL: &str = r#"
 scene = "scene.glb"
@@ -89,7 +90,7 @@ fn errors_name_file_line_and_field() {
         ("radius = -1\n", ["scene.toml:1:", "radius", "-1"]),
         ("alpha = 1.0\n", ["scene.toml:1:", "alpha", "1"]),
         ("[camera]\nup = [0, 0, 0]\n", ["scene.toml:2:", "camera.up", "direction"]),
-        ("[environment]\nstrength = 1\n", ["scene.toml:1:", "environment", "neither"]),
+        ("[environment]\nstrength = -1\n", ["scene.toml:2:", "environment.strength", "-1"]),
         ("[[sphere]]\ncentre = [0, 0, 0]\nradius = nan\n", ["scene.toml:3:", "sphere[0].radius", "NaN"]),
         ("[[sphere]]\nradius = 1\n", ["scene.toml:1:", "sphere[0]", "centre"]),
         ("[[light]]\nkind = \"point\"\nintensity = 1\n", ["scene.toml:1:", "light[0]", "position"]),
@@ -140,6 +141,29 @@ fn overrides() {
     let mut settings = Settings::parse(FULL, "scene.toml".as_ref()).unwrap();
     settings.set("sphere.1.radius=5").unwrap();
     assert_eq!(settings.spheres[1].radius, 5.0);
+}
+
+/// Its own environment, the sky that a dark scene gets, or none.
+#[test]
+fn the_scenes_environment_is_changed() {
+    let folder = Folder::new();
+    let settings = Settings::parse("[environment]\nrotation_degrees = 180", "scene.toml".as_ref()).unwrap();
+    let turned = |scene: &Scene| {
+        let mut scene = scene.clone();
+        settings
+            .apply_to_scene(&mut scene, folder.0.path())
+            .map(|warnings| (scene.environment.unwrap(), warnings.len()))
+    };
+    let mut scene = Glb::triangle().scene();
+    let (sky, n_warnings) = turned(&scene).unwrap();
+    assert_eq!((sky.rotation, sky.strength, n_warnings), (PI, 1.0, 1));
+    scene.environment = Some(Environment { strength: 3.0, ..Environment::uniform(Vec3::ONE) });
+    let (own, n_warnings) = turned(&scene).unwrap();
+    assert_eq!((own.rotation, own.strength, own.texels[0], n_warnings), (PI, 3.0, Vec3::ONE, 0));
+    scene.environment = None;
+    scene.materials.push(Material::emitter("lamp", Vec3::ONE));
+    scene.meshes[0].material = scene.materials.len() - 1;
+    assert!(turned(&scene).unwrap_err().to_string().contains("environment: neither file nor color"));
 }
 
 #[test]

@@ -78,11 +78,6 @@ impl Rig {
         self.pivot
     }
 
-    /// The axis that stays upright; unit.
-    pub fn up(&self) -> Vec3 {
-        self.up
-    }
-
     /// Right, up and forward of the camera; orthonormal.
     pub fn frame(&self) -> [Vec3; 3] {
         let m = Mat3::from(self.camera.world_from_camera.matrix3);
@@ -404,7 +399,7 @@ mod tests {
             prop_assert_eq!(rig.camera().world_from_camera, camera.world_from_camera);
             prop_assert_eq!(rig.camera().pack(30, 20), camera.pack(30, 20));
             let again = Rig::new(rig.camera(), BOUNDS);
-            prop_assert_eq!((again.pivot(), again.up()), (rig.pivot(), rig.up()));
+            prop_assert_eq!((again.pivot(), again.up), (rig.pivot(), rig.up));
         }
 
         #[test]
@@ -431,8 +426,8 @@ mod tests {
                 let [right, above, forward] = rig.frame();
                 prop_assert!((rig.position().distance(pivot) - distance).abs() < 1e-4 * (1.0 + distance));
                 prop_assert_eq!(rig.pivot(), pivot);
-                prop_assert!(right.dot(rig.up()).abs() < 1e-4 && above.dot(rig.up()) > 0.0);
-                prop_assert!(forward.dot(rig.up()).abs() < MAX_PITCH.sin() + 1e-6);
+                prop_assert!(right.dot(rig.up).abs() < 1e-4 && above.dot(rig.up) > 0.0);
+                prop_assert!(forward.dot(rig.up).abs() < MAX_PITCH.sin() + 1e-6);
             }
         }
 

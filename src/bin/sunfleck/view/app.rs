@@ -1,0 +1,398 @@
+//! The window: its state, and what is where in it.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use anyhow::{Result, bail};
+use eframe::egui;
+use sunfleck::output::tonemap::ToneMap;
+use sunfleck::scene::Camera;
+use sunfleck::scene::settings::Settings;
+
+use super::engine::{Choice, Engine, Limits, Message, Now, Opened, Save, Wake, Wanted};
+use super::files;
+use super::picture::PictureView;
+use super::state::{Edits, Remembered};
+use crate::cli::{Usage, ViewArgs};
+
+/// Key of what is remembered.
+const REMEMBERED: &str = "remembered";
+/// Seconds that a message stays.
+const MESSAGE_SECONDS: f64 = 6.0;
+
+/// What the command line asks for.
+#[derive(Clone, Debug, Default)]
+pub struct First {
+    pub choice: Option<Choice>,
+    pub limits: Limits,
+    /// Where saving goes without asking.
+    pub output: Option<PathBuf>,
+    /// To compare with.
+    pub reference: Option<PathBuf>,
+}
+
+impl First {
+    pub fn resolve(args: &ViewArgs) -> Result<Self> {
+        if let Some(path) = &args.output {
+            crate::job::check_output(path)?;
+        }
+        let mut set = args.set.clone();
+        set.extend(args.camera.iter().map(|name| format!("camera.name={name:?}")));
+        let choice = args.scene.clone().map(|name| Choice { name, set });
+        if choice.is_none() && !args.set.is_empty() {
+            bail!(Usage("--set changes a scene: which one?".into()));
+        }
+        let limits = Limits { iterations: args.iterations, seconds: args.seconds, noise: args.noise };
+        Ok(Self { choice, limits, output: args.output.clone(), reference: args.reference.clone() })
+    }
+}
+
+/// See the module. Panels read and change it.
+pub struct Viewer {
+    engine: Engine,
+    /// What is wanted; sent to the engine after every frame.
+    pub wanted: Wanted,
+    /// What there is; taken from the engine before every frame.
+    pub now: Now,
+    pub edits: Edits,
+    pub remembered: Remembered,
+    pub picture: PictureView,
+    pub inspect: super::inspect::InspectView,
+    pub compare: super::compare::CompareView,
+    /// Index into the scene's materials.
+    pub selected: Option<usize>,
+    pub output: Option<PathBuf>,
+    pub convergence: super::convergence::Convergence,
+    pub timing: super::timing::Timing,
+    /// What was open before.
+    pub previous: Option<Arc<Choice>>,
+    /// Of a texture, pixels.
+    most_side: usize,
+    /// Of the window.
+    title: String,
+    /// With the times they appeared.
+    messages: Vec<(f64, Message)>,
+    pub show_help: bool,
+    pub dialog: Option<files::Dialog>,
+    /// To be read.
+    reference: Option<PathBuf>,
+    pub pick: files::Pick,
+    pub start: super::start::Page,
+    wake: Wake,
+    /// The scene that `edits` belongs to.
+    editing: Option<Arc<Opened>>,
+}
+
+impl Viewer {
+    pub fn new(storage: Option<&dyn eframe::Storage>, engine: Engine, wake: Wake, first: First) -> Self {
+        let remembered = storage.and_then(|storage| eframe::get_value(storage, REMEMBERED)).unwrap_or_default();
+        let wanted = Wanted { scene: first.choice.map(Arc::new), limits: first.limits, ..Wanted::default() };
+        let now = engine.now();
+        Self {
+            engine,
+            wanted,
+            now,
+            edits: Edits::default(),
+            remembered,
+            picture: PictureView::default(),
+            inspect: Default::default(),
+            compare: Default::default(),
+            output: first.output,
+            convergence: Default::default(),
+            timing: Default::default(),
+            previous: None,
+            most_side: 0,
+            title: String::new(),
+            messages: vec![],
+            show_help: false,
+            dialog: None,
+            reference: first.reference,
+            pick: Arc::new(files::pick),
+            selected: None,
+            start: Default::default(),
+            wake,
+            editing: None,
+        }
+    }
+
+    /// Opens a file, or a shipped scene by its name.
+    pub fn open(&mut self, name: impl Into<String>) {
+        if self.editing.is_some() {
+            self.previous = self.wanted.scene.clone();
+        }
+        self.wanted.scene = Some(Arc::new(Choice { name: name.into(), set: vec![] }));
+        self.wanted.settings = None;
+        self.wanted.reloads += 1;
+    }
+
+    /// Opens what was open before.
+    pub fn back(&mut self) {
+        self.wanted.scene = self.previous.take();
+        self.wanted.settings = None;
+        self.wanted.reloads += 1;
+    }
+
+    /// Does again what failed.
+    pub fn retry(&mut self) {
+        self.wanted.retries += 1;
+    }
+
+    pub fn close_scene(&mut self) {
+        (self.wanted.scene, self.wanted.settings) = (None, None);
+    }
+
+    /// Reads the scene's file again; settings stay.
+    pub fn reload(&mut self) {
+        self.wanted.reloads += 1;
+    }
+
+    pub fn restart(&mut self) {
+        self.wanted.restarts += 1;
+    }
+
+    /// Changes the settings; `what` names what is edited, for undo.
+    pub fn edit(&mut self, ui: &egui::Ui, what: &'static str, change: impl FnOnce(&mut Settings)) {
+        let (time, is_dragging) = ui.input(|i| (i.time, i.pointer.is_decidedly_dragging()));
+        self.edit_at(time, what, change);
+        if is_dragging {
+            self.picture.move_on(time);
+        }
+    }
+
+    /// The same at a time in seconds.
+    pub fn edit_at(&mut self, time: f64, what: &'static str, change: impl FnOnce(&mut Settings)) {
+        if self.editing.is_none() {
+            return;
+        }
+        let mut settings = self.edits.now().as_ref().clone();
+        change(&mut settings);
+        self.edits.set(what, time, settings);
+        self.wanted.settings = Some(Arc::clone(self.edits.now()));
+    }
+
+    pub fn undo(&mut self) {
+        self.edits.undo();
+        self.use_edits();
+    }
+
+    pub fn redo(&mut self) {
+        self.edits.redo();
+        self.use_edits();
+    }
+
+    fn use_edits(&mut self) {
+        self.wanted.settings = self.editing.as_ref().map(|_| Arc::clone(self.edits.now()));
+    }
+
+    /// Brightens the picture by so many stops.
+    pub fn expose(&mut self, stops: f32) {
+        let now = self.wanted.painting.look.exposure.or(self.now.painted.as_ref().map(|painted| painted.exposure));
+        self.wanted.painting.look.exposure = Some((2.0 * (now.unwrap_or(0.0) + stops)).round() / 2.0);
+    }
+
+    pub fn next_tone(&mut self) {
+        let tonemap = &mut self.wanted.painting.look.tonemap;
+        *tonemap = match tonemap {
+            ToneMap::Neutral => ToneMap::Agx,
+            ToneMap::Agx => ToneMap::Srgb,
+            ToneMap::Srgb => ToneMap::Neutral,
+        };
+    }
+
+    /// One iteration, then a pause.
+    pub fn step(&mut self) {
+        self.wanted.paused = true;
+        self.wanted.steps += 1;
+    }
+
+    /// Moves the camera until the whole scene is in the picture.
+    pub fn frame_all(&mut self, time: f64) {
+        let Some(bounds) = self.editing.as_ref().map(|opened| opened.bounds()) else { return };
+        let Some([width, height]) = self.full_size() else { return };
+        self.move_rig(time, &mut |rig| rig.frame_all(bounds, width as f32 / height as f32));
+    }
+
+    /// The settings as a file holds them.
+    pub fn settings_text(&self) -> Option<String> {
+        let mut settings = self.editing.as_ref()?.source.rooted(self.edits.now());
+        settings.exposure = self.wanted.painting.look.exposure;
+        Some(settings.to_toml())
+    }
+
+    /// What renders this picture on the command line.
+    pub fn command(&self) -> Option<String> {
+        let opened = self.editing.as_ref()?;
+        let iterations = self.now.frame.as_ref().map_or(1, |frame| frame.film.n_iterations);
+        Some(opened.command(self.edits.now(), iterations, Path::new("picture.exr")))
+    }
+
+    /// What is open.
+    pub fn opened(&self) -> Option<&Arc<Opened>> {
+        self.editing.as_ref()
+    }
+
+    /// The camera that the settings make.
+    pub fn camera(&self) -> Option<Camera> {
+        self.edits.now().camera_of(&self.editing.as_ref()?.loaded.scene).ok()
+    }
+
+    /// Writes the picture to `path`, as it looks now.
+    pub fn save_to(&mut self, path: PathBuf) {
+        self.engine.save(Save { path, look: self.wanted.painting.look });
+    }
+
+    /// Shows a message.
+    pub fn say(&mut self, ui: &egui::Ui, message: Message) {
+        self.messages.push((ui.input(|i| i.time), message));
+    }
+
+    /// Asks for another frame, from any thread.
+    pub fn wake(&self) -> Wake {
+        Arc::clone(&self.wake)
+    }
+
+    pub fn engine(&self) -> &Engine {
+        &self.engine
+    }
+
+    /// One frame.
+    pub fn show(&mut self, ui: &mut egui::Ui) {
+        let began = Instant::now();
+        self.look_at_engine(ui);
+        let wanted = self.wanted.clone();
+        files::poll(ui, self);
+        if let Some(path) = self.reference.take() {
+            super::compare::load(ui, self, &path);
+        }
+        super::keys::handle(ui, self);
+        egui::Panel::top("bar").show(ui, |ui| super::bar::show(ui, self));
+        egui::Panel::bottom("status").show(ui, |ui| super::bar::status(ui, self));
+        if self.editing.is_some() {
+            if self.remembered.show_convergence {
+                let panel =
+                    egui::Panel::bottom("convergence").resizable(true).default_size(220.0).size_range(120.0..=600.0);
+                panel.show(ui, |ui| super::convergence::show(ui, self));
+            }
+            if self.remembered.show_settings {
+                let panel = egui::Panel::left("settings").resizable(true).default_size(270.0).size_range(200.0..=500.0);
+                panel.show(ui, |ui| super::settings::show(ui, self));
+            }
+            if self.remembered.show_inspect {
+                let panel = egui::Panel::right("inspect").resizable(true).default_size(250.0).size_range(180.0..=500.0);
+                panel.show(ui, |ui| super::inspect::show(ui, self));
+            }
+        }
+        egui::CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| match self.wanted.scene {
+            Some(_) => super::picture::show(ui, self),
+            None => super::start::show(ui, self),
+        });
+        if self.wanted.scene.is_some() {
+            super::start::drop_hint(ui);
+        }
+        super::help::show(ui, self);
+        self.show_messages(ui);
+        let asks = |w: &Wanted| (w.settings.clone(), w.scene.clone(), w.restarts);
+        if asks(&wanted) != asks(&self.wanted) {
+            self.timing.ask(began, self.now.estimate);
+        }
+        self.engine.want(&self.wanted);
+        self.timing.frame(began.elapsed());
+    }
+
+    fn look_at_engine(&mut self, ui: &egui::Ui) {
+        self.now = self.engine.now();
+        if let Some(painted) = &self.now.painted {
+            self.timing.see(Instant::now(), painted.frame.estimate);
+        }
+        let most_side = ui.input(|i| i.max_texture_side);
+        if self.most_side != most_side {
+            self.most_side = most_side;
+            self.engine.set_most_side(most_side);
+        }
+        let time = ui.input(|i| i.time);
+        self.messages.extend(self.engine.take_messages().into_iter().map(|message| (time, message)));
+        let same = match (&self.editing, &self.now.opened) {
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            (None, None) => true,
+            _ => false,
+        };
+        if !same {
+            self.selected = None;
+            let is_reload = self.wanted.settings.is_some() && self.now.opened.is_some();
+            self.editing = self.now.opened.clone();
+            self.picture.forget();
+            if let Some(opened) = &self.editing {
+                self.remembered.opened(&opened.source.name);
+                if !is_reload {
+                    self.edits = Edits::new(opened.source.settings.clone());
+                    self.wanted.painting.look.exposure = opened.source.settings.exposure;
+                    self.picture = PictureView::default();
+                }
+            }
+        }
+        let title = match &self.wanted.scene {
+            Some(choice) => {
+                let n = self.now.frame.as_ref().map_or(0, |frame| frame.film.n_iterations);
+                format!("{} – {n} iterations – Sunfleck", choice.name)
+            }
+            None => "Sunfleck".to_owned(),
+        };
+        // Under X11 the window cannot be asked for its title, and each of these makes another frame.
+        if self.title != title {
+            self.title.clone_from(&title);
+            ui.ctx().send_viewport_cmd(egui::ViewportCommand::Title(title));
+        }
+        if let Some(dropped) = ui.input(|i| i.raw.dropped_files.first().map(|file| file.path().to_path_buf())) {
+            files::dropped(ui, self, &dropped);
+        }
+    }
+
+    fn show_messages(&mut self, ui: &egui::Ui) {
+        let now = ui.input(|i| i.time);
+        self.messages.retain(|(when, message)| matches!(message, Message::Error(_)) || now - when < MESSAGE_SECONDS);
+        if self.messages.is_empty() {
+            return;
+        }
+        let mut dismissed = None;
+        egui::Area::new(egui::Id::unique("messages")).anchor(egui::Align2::RIGHT_BOTTOM, [-12.0, -36.0]).show(
+            ui.ctx(),
+            |ui| {
+                for (i, (_, message)) in self.messages.iter().enumerate() {
+                    let (text, color) = match message {
+                        Message::Said(text) => (text, ui.visuals().text_color()),
+                        Message::Warning(text) => (text, ui.visuals().warn_fg_color),
+                        Message::Error(text) => (text, ui.visuals().error_fg_color),
+                    };
+                    egui::Frame::popup(ui.style()).show(ui, |ui| {
+                        ui.set_max_width(420.0);
+                        ui.horizontal_wrapped(|ui| {
+                            ui.colored_label(color, text);
+                            if ui.small_button("Dismiss").clicked() {
+                                dismissed = Some(i);
+                            }
+                        });
+                    });
+                }
+            },
+        );
+        if let Some(i) = dismissed {
+            self.messages.remove(i);
+        }
+        // Errors stay; nobody need look after them.
+        let passing = self.messages.iter().filter(|(_, message)| !matches!(message, Message::Error(_)));
+        if let Some(end) = passing.map(|(when, _)| when + MESSAGE_SECONDS).reduce(f64::min) {
+            ui.ctx().request_repaint_after_secs((end - now).max(0.0) as f32);
+        }
+    }
+}
+
+impl eframe::App for Viewer {
+    fn ui(&mut self, ui: &mut egui::Ui, _: &mut eframe::Frame) {
+        self.show(ui);
+    }
+
+    fn save(&mut self, storage: &mut dyn eframe::Storage) {
+        eframe::set_value(storage, REMEMBERED, &self.remembered);
+    }
+}

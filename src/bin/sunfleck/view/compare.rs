@@ -1,0 +1,286 @@
+//! The picture beside a reference: an .exr, or the picture of a moment ago.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use eframe::egui;
+use egui::{Color32, Key, Rect, Stroke, pos2};
+use sunfleck::output;
+use sunfleck::output::difference::Measure;
+use sunfleck::output::tonemap::ToneMap;
+
+use super::app::Viewer;
+use super::charts::short;
+use super::engine::{Comparison, Message, Painted, Reference, View};
+use super::files;
+use super::inspect::{row, table};
+
+/// Half the width of what the line of the wipe is held by, points.
+const HOLD: f32 = 6.0;
+
+/// How the reference is shown.
+pub struct CompareView {
+    /// Where the line is, share of the picture's width.
+    wipe: f32,
+    texture: Option<(Made, egui::TextureHandle)>,
+}
+
+impl Default for CompareView {
+    fn default() -> Self {
+        Self { wipe: 0.5, texture: None }
+    }
+}
+
+/// What a texture of the reference was made from.
+struct Made {
+    reference: Arc<Reference>,
+    exposure: f32,
+    tonemap: ToneMap,
+    stops: bool,
+}
+
+impl Made {
+    fn of(painted: &Painted, reference: &Arc<Reference>) -> Self {
+        Self {
+            reference: Arc::clone(reference),
+            exposure: painted.exposure,
+            tonemap: painted.painting.look.tonemap,
+            stops: painted.painting.view == View::Stops,
+        }
+    }
+
+    fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.reference, &other.reference)
+            && (self.exposure, self.tonemap, self.stops) == (other.exposure, other.tonemap, other.stops)
+    }
+}
+
+/// All, in the order they are listed in.
+fn comparisons() -> impl Iterator<Item = Comparison> + Clone {
+    let differences = Measure::ALL.into_iter().map(Comparison::Difference);
+    [Comparison::Off, Comparison::Wipe].into_iter().chain(differences).chain([Comparison::Flip])
+}
+
+/// Name, and what it is.
+fn describe(comparison: Comparison) -> (&'static str, &'static str) {
+    match comparison {
+        Comparison::Off => ("Off", "The picture alone; hold Shift to see the reference in its place"),
+        Comparison::Wipe => ("Wipe", "The picture left of a line, the reference right of it; drag the line"),
+        Comparison::Difference(measure) => match measure {
+            Measure::Absolute => ("Absolute difference", "|x − y|, mean of the channels"),
+            Measure::Squared => ("Squared difference", "(x − y)², mean of the channels"),
+            Measure::Relative => ("Relative difference", "|x − y| / (|y| + 0.01), mean of the channels"),
+            Measure::RelativeSquared => ("Relative squared", "(x − y)² / (y² + 0.01); its mean is the relMSE"),
+            Measure::Signed => ("Signed difference", "x − y: green where the picture is brighter, red where darker"),
+        },
+        Comparison::Flip => ("FLIP", "The difference as eyes see it, of both as they are shown now"),
+    }
+}
+
+impl Viewer {
+    /// The next of the list, from the last to the first.
+    pub fn next_comparison(&mut self) {
+        let wanted = &mut self.wanted.painting.comparison;
+        let mut following = comparisons().cycle().skip_while(|comparison| comparison != wanted).skip(1);
+        *wanted = following.next().unwrap_or_default();
+    }
+}
+
+/// Why a reference cannot be compared with a picture of `size`.
+fn unfit(reference: &Reference, size: [u32; 2]) -> Option<String> {
+    let [width, height] = size;
+    let picture = &reference.picture;
+    let name = &reference.name;
+    if picture.size != size {
+        let [w, h] = picture.size;
+        return Some(format!("{name} has {w}×{h} pixels, the picture {width}×{height}: they cannot be compared"));
+    }
+    let is_whole = picture.crop == [0, 0, width, height];
+    (!is_whole).then(|| format!("{name} has only a part of the picture: they cannot be compared"))
+}
+
+/// Of the panel.
+pub fn section(ui: &mut egui::Ui, viewer: &mut Viewer) {
+    let reference = viewer.now.reference.clone();
+    ui.horizontal(|ui| {
+        if ui.button("Open …").on_hover_text("An .exr as the reference").clicked() {
+            files::ask_reference(viewer);
+        }
+        let frame = viewer.now.frame.clone().filter(|frame| !frame.is_preview);
+        let pin = ui.add_enabled(frame.is_some(), egui::Button::new("Pin"));
+        if let (true, Some(frame)) = (pin.on_hover_text("The picture as it is now as the reference").clicked(), frame) {
+            let name = format!("picture after {} iterations", frame.film.n_iterations);
+            let reference = Reference { name, picture: frame.picture() };
+            viewer.engine().set_reference(Some(Arc::new(reference)));
+        }
+        let clear = ui.add_enabled(reference.is_some(), egui::Button::new("Clear"));
+        if clear.on_hover_text("Without a reference again").clicked() {
+            viewer.engine().set_reference(None);
+        }
+    });
+    let Some(reference) = reference else {
+        ui.weak("No reference. Open or drop an .exr, or pin the picture.");
+        return;
+    };
+    ui.add(egui::Label::new(&reference.name).truncate()).on_hover_text("The reference");
+    if let Some(why) = viewer.full_size().and_then(|size| unfit(&reference, size)) {
+        ui.colored_label(ui.visuals().warn_fg_color, why);
+        return;
+    }
+    let wanted = &mut viewer.wanted.painting.comparison;
+    let (name, text) = describe(*wanted);
+    egui::ComboBox::from_id_salt("comparison")
+        .selected_text(name)
+        .width(160.0)
+        .height(400.0)
+        .show_ui(ui, |ui| {
+            for comparison in comparisons() {
+                let (name, text) = describe(comparison);
+                ui.selectable_value(wanted, comparison, name).on_hover_text(text);
+            }
+        })
+        .response
+        .on_hover_text(format!("{text}. Does not restart the estimate."));
+    let painted = viewer.picture.painted();
+    if let Some(problem) = painted.and_then(|painted| painted.problem.as_ref()) {
+        ui.colored_label(ui.visuals().error_fg_color, problem);
+    }
+    let figures = painted.and_then(|painted| painted.figures);
+    table(ui, "figures", |ui| {
+        let number = |v: f64| short(v as f32);
+        row(ui, "relMSE", figures.map(|f| number(f.rel_mse)), "Mean of (x − y)² / (y² + 0.01)");
+        row(
+            ui,
+            "Mean x − y",
+            figures.map(|f| number(f.mean_difference)),
+            "Above 0: the picture is brighter, W/(m² sr)",
+        );
+        let relative = figures.map(|f| format!("{} %", number(100.0 * f.relative_mean_difference)));
+        row(ui, "Relative to y", relative, "Mean of x − y over the mean of y");
+        let shown = painted.and_then(|painted| Some((painted.painting.comparison, painted.mean?)));
+        let flip = shown.filter(|(comparison, _)| *comparison == Comparison::Flip);
+        row(ui, "FLIP", flip.map(|(_, mean)| number(mean)), "Mean; measured while FLIP is shown");
+        let difference = shown.filter(|(comparison, _)| *comparison != Comparison::Flip);
+        row(ui, "Mean shown", difference.map(|(_, mean)| number(mean)), "Of the difference that is shown");
+    });
+}
+
+/// Over the picture at `rect`.
+pub fn overlay(ui: &egui::Ui, viewer: &mut Viewer, painter: &egui::Painter, rect: Rect) {
+    let Some(painted) = viewer.picture.painted().cloned() else { return };
+    let Some((reference, _)) = &painted.reference else { return };
+    let Some((size, rgba)) = painted.reference_texture() else { return };
+    let visible = rect.intersect(painter.clip_rect());
+    let is_held = is_asked_for(ui, visible);
+    let is_wiped = painted.painting.comparison == Comparison::Wipe;
+    if !(is_held || is_wiped) || !visible.is_positive() {
+        return;
+    }
+    let view = &mut viewer.compare;
+    let made = Made::of(&painted, reference);
+    if !view.texture.as_ref().is_some_and(|(of, _)| of.is(&made)) {
+        let image = egui::ColorImage::from_rgba_unmultiplied(size, rgba);
+        let options = egui::TextureOptions { magnification: egui::TextureFilter::Nearest, ..Default::default() };
+        view.texture = Some((made, ui.ctx().load_texture("reference", image, options)));
+    }
+    let Some((_, texture)) = &view.texture else { return };
+    if is_held {
+        painter.image(texture.id(), rect, uv(0.0), Color32::WHITE);
+        name(painter, visible.left_top(), egui::Align2::LEFT_TOP, &reference.name);
+        return;
+    }
+    let (x, from) = line(view.wipe, rect, visible);
+    let hold = Rect::from_x_y_ranges(x - HOLD..=x + HOLD, visible.y_range());
+    let response = ui.interact(hold, egui::Id::unique("wipe"), egui::Sense::drag());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Wipe"));
+    let right = Rect::from_min_max(pos2(x, rect.top()), rect.max);
+    painter.image(texture.id(), right, uv(from), Color32::WHITE);
+    let (width, color) =
+        if response.hovered() || response.dragged() { (2.5, Color32::WHITE) } else { (1.5, Color32::LIGHT_GRAY) };
+    painter.vline(x + 1.0, visible.y_range(), Stroke::new(width + 1.0, Color32::from_black_alpha(140)));
+    painter.vline(x, visible.y_range(), Stroke::new(width, color));
+    name(painter, pos2(x - HOLD, visible.top()), egui::Align2::RIGHT_TOP, "picture");
+    name(painter, pos2(x + HOLD, visible.top()), egui::Align2::LEFT_TOP, &reference.name);
+    if response.hovered() || response.dragged() {
+        ui.ctx().set_cursor_icon(egui::CursorIcon::ResizeHorizontal);
+    }
+    if let (true, Some(pointer)) = (response.dragged(), response.interact_pointer_pos()) {
+        view.wipe = ((pointer.x - rect.left()) / rect.width()).clamp(0.0, 1.0);
+        ui.ctx().request_repaint();
+    }
+}
+
+/// Whether the reference is to be seen in the place of the picture: Shift, and nothing else.
+fn is_asked_for(ui: &egui::Ui, visible: Rect) -> bool {
+    if ui.ctx().egui_wants_keyboard_input() {
+        return false;
+    }
+    ui.input(|i| {
+        i.modifiers.shift_only()
+            && i.keys_down.iter().all(|key| matches!(key, Key::ShiftLeft | Key::ShiftRight))
+            && !i.pointer.any_down()
+            && i.pointer.latest_pos().is_some_and(|p| visible.contains(p))
+    })
+}
+
+/// Where the line at `share` of the picture is drawn, kept in sight, and which share that is.
+fn line(share: f32, rect: Rect, visible: Rect) -> (f32, f32) {
+    let x = egui::lerp(rect.x_range(), share).clamp(visible.left(), visible.right());
+    (x, (x - rect.left()) / rect.width())
+}
+
+/// The part of a texture right of `from`.
+fn uv(from: f32) -> Rect {
+    Rect::from_min_max(pos2(from, 0.0), pos2(1.0, 1.0))
+}
+
+fn name(painter: &egui::Painter, at: egui::Pos2, anchor: egui::Align2, text: &str) {
+    let galley = painter.layout_no_wrap(text.to_owned(), egui::FontId::proportional(12.0), Color32::WHITE);
+    let rect = anchor.anchor_size(at, galley.size() + egui::vec2(12.0, 8.0)).shrink2(egui::vec2(2.0, 2.0));
+    painter.rect_filled(rect, 3.0, Color32::from_black_alpha(150));
+    painter.galley(rect.min + egui::vec2(4.0, 2.0), galley, Color32::WHITE);
+}
+
+/// Reads a reference, on a thread of its own.
+pub fn load(_: &egui::Ui, viewer: &mut Viewer, path: &Path) {
+    let (path, set, say) = (path.to_owned(), viewer.engine().referee(), viewer.engine().speaker());
+    std::thread::spawn(move || match output::exr::read(&path) {
+        Ok(picture) => {
+            let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+            say(Message::Said(format!("{name} is the reference")));
+            set(Reference { name, picture });
+        }
+        Err(error) => say(Message::Error(crate::one_line(&error.to_string()))),
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sunfleck::output::Picture;
+
+    #[test]
+    fn the_line_stays_in_sight() {
+        let rect = Rect::from_min_max(pos2(-100.0, 0.0), pos2(300.0, 100.0));
+        let visible = Rect::from_min_max(pos2(0.0, 0.0), pos2(200.0, 100.0));
+        assert_eq!(line(0.5, rect, visible), (100.0, 0.5));
+        assert_eq!(line(0.0, rect, visible), (0.0, 0.25));
+        assert_eq!(line(1.0, rect, visible), (200.0, 0.75));
+    }
+
+    #[test]
+    fn references_of_other_sizes_are_named_and_refused() {
+        let picture = |size: [u32; 2], crop| Picture { size, crop, rgb: vec![], variance: None };
+        let reference = |size, crop| Reference { name: "far.exr".into(), picture: picture(size, crop) };
+        assert_eq!(unfit(&reference([8, 6], [0, 0, 8, 6]), [8, 6]), None);
+        let why = unfit(&reference([8, 6], [0, 0, 8, 6]), [9, 6]).unwrap();
+        assert!(why.contains("far.exr") && why.contains("8×6") && why.contains("9×6"), "{why}");
+        assert!(unfit(&reference([8, 6], [1, 0, 8, 6]), [8, 6]).unwrap().contains("part"));
+    }
+
+    #[test]
+    fn every_comparison_has_a_name_of_its_own() {
+        let names: std::collections::BTreeSet<_> = comparisons().map(|c| describe(c).0).collect();
+        assert_eq!(names.len(), comparisons().count());
+    }
+}

@@ -1,0 +1,421 @@
+//! Plots of how the estimate converges. egui_plot has no logarithmic axes: logarithms are plotted, their powers written.
+
+use std::ops::RangeInclusive;
+
+use eframe::egui;
+use egui_plot::{AxisHints, Corner, GridInput, GridMark, HoverPosition, Legend, Line, LineStyle, Plot, PlotPoints};
+use sunfleck::ppm::StageTimes;
+
+use super::app::Viewer;
+use super::engine::{History, Measured, Record};
+use crate::progress;
+
+/// Points a line, at most.
+const MOST_POINTS: usize = 500;
+/// Width below which fewer plots stand side by side, points.
+const LEAST_WIDTH: f32 = 210.0;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Error,
+    Radius,
+    Rate,
+    Stages,
+}
+
+const KINDS: [Kind; 4] = [Kind::Error, Kind::Radius, Kind::Rate, Kind::Stages];
+
+impl Kind {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Error => "Error",
+            Self::Radius => "Radius",
+            Self::Rate => "Photons/s",
+            Self::Stages => "Stages",
+        }
+    }
+
+    fn describe(self) -> &'static str {
+        match self {
+            Self::Error => {
+                "relMSE: noise as estimated from the two halves of the iterations, which do not see the blur of the \
+                 radius; against the reference, if there is one; and the slopes of the theory (Knaus & Zwicker 2011)"
+            }
+            Self::Radius => "median radius of the estimate",
+            Self::Rate => "photon paths that leave the lamps, and photons that are stored, a second",
+            Self::Stages => "milliseconds of each stage of an iteration; on a GPU from timestamps where it has them",
+        }
+    }
+
+    fn is_log(self) -> bool {
+        self != Self::Stages
+    }
+
+    /// A value on the axis, as people write it.
+    fn value(self, y: f64) -> String {
+        match self {
+            Self::Error => format!("{:.2e}", 10f64.powf(y)),
+            Self::Radius => progress::length(10f64.powf(y) as f32),
+            Self::Rate => progress::with_prefix(10f64.powf(y)).trim_end().to_owned(),
+            Self::Stages => format!("{y:.2} ms"),
+        }
+    }
+
+    /// The same at a grid line.
+    fn mark(self, y: f64) -> String {
+        match self {
+            Self::Error => format!("{:.0e}", 10f64.powf(y)),
+            Self::Stages => format!("{y}"),
+            _ => self.value(y),
+        }
+    }
+}
+
+/// What is shown, and the lines as they were last made.
+pub struct Convergence {
+    by_seconds: bool,
+    shown: [bool; KINDS.len()],
+    made_of: Option<Key>,
+    curves: [Vec<Curve>; KINDS.len()],
+}
+
+impl Default for Convergence {
+    fn default() -> Self {
+        Self { by_seconds: false, shown: [true; KINDS.len()], made_of: None, curves: Default::default() }
+    }
+}
+
+/// What lines depend on.
+type Key = (Option<Record>, Option<Measured>, Option<Measured>, bool);
+
+/// A line, in the units of its axes.
+#[derive(Clone, Debug, PartialEq)]
+struct Curve {
+    name: String,
+    points: Vec<[f64; 2]>,
+    dashed: bool,
+}
+
+/// Points of the history, few enough to draw.
+struct Sample {
+    records: Vec<Record>,
+    estimated: Vec<Measured>,
+    against_reference: Vec<Measured>,
+}
+
+impl Sample {
+    fn of(history: &History) -> Self {
+        Self {
+            records: history.records.sample(MOST_POINTS),
+            estimated: history.estimated.sample(MOST_POINTS),
+            against_reference: history.against_reference.sample(MOST_POINTS),
+        }
+    }
+}
+
+/// The panel.
+pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
+    let by_seconds = viewer.convergence.by_seconds;
+    let made_of = viewer.convergence.made_of;
+    let read = |history: &History| {
+        let last = |of: &super::engine::Series<Measured>| of.last().copied();
+        let key =
+            (history.records.last().copied(), last(&history.estimated), last(&history.against_reference), by_seconds);
+        (key, (made_of != Some(key)).then(|| Sample::of(history)))
+    };
+    let (key, sample) = viewer.engine().history(read);
+    let alpha = viewer.now.frame.as_ref().map_or(2.0 / 3.0, |frame| f64::from(frame.params.alpha));
+    let view = &mut viewer.convergence;
+    if let Some(sample) = sample {
+        view.curves = KINDS.map(|kind| curves(kind, &sample, alpha, by_seconds));
+        view.made_of = Some(key);
+    }
+    heading(ui, view, key);
+    let shown: Vec<usize> = (0..KINDS.len()).filter(|&i| view.shown[i]).collect();
+    let room = (ui.available_width() / LEAST_WIDTH).max(1.0) as usize;
+    let shown = &shown[..shown.len().min(room)];
+    if shown.is_empty() || key.0.is_none() {
+        ui.weak(if shown.is_empty() { "No plot is chosen." } else { "Nothing to plot before the first iteration." });
+        return;
+    }
+    ui.columns(shown.len(), |columns| {
+        for (ui, &i) in columns.iter_mut().zip(shown) {
+            plot(ui, KINDS[i], &view.curves[i], by_seconds);
+        }
+    });
+}
+
+/// What is plotted against what, and the last errors.
+fn heading(ui: &mut egui::Ui, view: &mut Convergence, (_, estimated, measured, _): Key) {
+    ui.horizontal(|ui| {
+        ui.selectable_value(&mut view.by_seconds, false, "Iterations").on_hover_text("Plot against iterations");
+        let seconds = "Plot against seconds since the restart, pauses left out";
+        ui.selectable_value(&mut view.by_seconds, true, "Seconds").on_hover_text(seconds);
+        ui.separator();
+        for (kind, shown) in KINDS.iter().zip(&mut view.shown) {
+            let help = "Drag to shift a plot, Ctrl and wheel to zoom, double click to see all of it";
+            ui.checkbox(shown, kind.name()).on_hover_text(format!("{}. {help}.", kind.describe()));
+        }
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            let text = [("measured", measured), ("estimated", estimated)]
+                .iter()
+                .filter_map(|(what, last)| Some(format!("{what} {:.2e}", last.as_ref()?.rel_mse)))
+                .collect::<Vec<_>>();
+            if !text.is_empty() {
+                ui.label(format!("relMSE {}", text.join(", "))).on_hover_text(Kind::Error.describe());
+            }
+        });
+    });
+}
+
+fn plot(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], by_seconds: bool) {
+    let unit = match kind {
+        Kind::Error => "Error, relMSE",
+        Kind::Radius => "Radius",
+        Kind::Rate => "Photons a second",
+        Kind::Stages => "Stages, ms",
+    };
+    ui.strong(unit).on_hover_text(kind.describe());
+    let x_value = move |x: f64| match by_seconds {
+        true => progress::seconds(10f64.powf(x)),
+        false => format!("{:.0}", 10f64.powf(x)),
+    };
+    let x_mark = move |mark: GridMark, range: &RangeInclusive<f64>| {
+        let text = || if by_seconds { small_number(10f64.powf(mark.value)) } else { count(10f64.powf(mark.value)) };
+        if is_labelled(mark.value, range) { text() } else { String::new() }
+    };
+    let y_mark = move |mark: GridMark, range: &RangeInclusive<f64>| {
+        if !kind.is_log() || is_labelled(mark.value, range) { kind.mark(mark.value) } else { String::new() }
+    };
+    let label = move |at: &HoverPosition<'_>| {
+        let (name, position) = match at {
+            HoverPosition::NearDataPoint { plot_name, position, .. } => (*plot_name, position),
+            HoverPosition::Elsewhere { position } => ("", position),
+        };
+        let x = format!("{}{}", x_value(position.x), if by_seconds { "" } else { " iterations" });
+        let line = if name.is_empty() { String::new() } else { format!("{name}\n") };
+        Some(format!("{line}{}\n{x}", kind.value(position.y)))
+    };
+    let group = egui::Id::unique("convergence cursor");
+    let mut plot = Plot::new(("convergence", kind.name()))
+        .height(ui.available_height().max(40.0))
+        .allow_scroll(false)
+        .allow_boxed_zoom(false)
+        .link_cursor(group, [true, false])
+        .x_grid_spacer(log_marks)
+        .custom_x_axes(vec![AxisHints::new_x().label_spacing(16.0..=24.0).formatter(x_mark)])
+        .custom_y_axes(vec![AxisHints::new_y().label_spacing(12.0..=18.0).min_thickness(44.0).formatter(y_mark)])
+        .label_formatter(label);
+    if kind.is_log() {
+        plot = plot.y_grid_spacer(log_marks);
+        // A radius that has hardly changed is not to fill the height.
+        let ys = || curves.iter().flat_map(|curve| &curve.points).map(|point| point[1]);
+        let (least, most) = (ys().fold(f64::INFINITY, f64::min), ys().fold(f64::NEG_INFINITY, f64::max));
+        if most >= least && most - least < 0.5 {
+            let middle = 0.5 * (least + most);
+            plot = plot.include_y(middle - 0.25).include_y(middle + 0.25);
+        }
+    } else {
+        plot = plot.include_y(0.0);
+    }
+    if curves.len() > 1 {
+        let corner = if kind == Kind::Stages { Corner::LeftTop } else { Corner::LeftBottom };
+        let legend = Legend::default().position(corner).text_style(egui::TextStyle::Small).background_alpha(0.6);
+        plot = plot.legend(legend.follow_insertion_order(true));
+    }
+    plot.show(ui, |plot| {
+        for curve in curves {
+            let style = if curve.dashed { LineStyle::dashed_loose() } else { LineStyle::Solid };
+            plot.line(Line::new(curve.name.clone(), PlotPoints::from(curve.points.clone())).style(style));
+        }
+    });
+}
+
+/// The lines of a plot.
+fn curves(kind: Kind, sample: &Sample, alpha: f64, by_seconds: bool) -> Vec<Curve> {
+    let at = |iteration: u32, seconds: f64| if by_seconds { seconds } else { f64::from(iteration) }.log10();
+    let solid =
+        |name: &str, points: Vec<[f64; 2]>| Curve { name: name.to_owned(), points: finite(points), dashed: false };
+    let records = &sample.records;
+    let of_records = |name: &str, value: &dyn Fn(&Record) -> f64| {
+        solid(name, records.iter().map(|r| [at(r.iteration, r.seconds), value(r)]).collect())
+    };
+    match kind {
+        Kind::Error => {
+            let noise = alpha;
+            // Squared bias falls as N^(-2(1-α)): the slower of the two remains.
+            let all = alpha.min(2.0 - 2.0 * alpha);
+            let lines = [("noise, estimated", &sample.estimated, noise), ("measured", &sample.against_reference, all)];
+            let mut curves = vec![];
+            for (name, measured, exponent) in lines.into_iter().filter(|(_, measured, _)| !measured.is_empty()) {
+                let points = measured.iter().map(|m| [at(m.iteration, m.seconds), m.rel_mse.log10()]).collect();
+                let curve = solid(name, points);
+                let slope = slope(&curve.points, exponent);
+                curves.push(curve);
+                let name = if by_seconds { "t" } else { "N" };
+                curves.push(Curve { name: format!("{name}^−{exponent:.2}"), points: slope, dashed: true });
+            }
+            curves
+        }
+        Kind::Radius => vec![of_records("radius", &|r| f64::from(r.radius).log10())],
+        Kind::Rate => {
+            let rate = |name: &str, photons: fn(&Record) -> u32| {
+                let before = std::iter::once(Record::default()).chain(records.iter().copied());
+                let points = before.zip(records).map(|(before, r)| {
+                    let n = f64::from(r.iteration - before.iteration) * f64::from(photons(r));
+                    [at(r.iteration, r.seconds), (n / (r.seconds - before.seconds)).log10()]
+                });
+                solid(name, points.collect())
+            };
+            vec![rate("emitted", |r| r.n_paths), rate("stored", |r| r.n_photons)]
+        }
+        Kind::Stages => {
+            type Stage = (&'static str, fn(&StageTimes) -> f64);
+            let stages: [Stage; 5] = [
+                ("eye", |t| t.eye),
+                ("photons", |t| t.photons),
+                ("build", |t| t.build),
+                ("gather", |t| t.gather),
+                ("accumulate", |t| t.accumulate),
+            ];
+            stages.iter().map(|(name, stage)| of_records(name, &|r| 1e3 * stage(&r.times))).collect()
+        }
+    }
+}
+
+/// What has no logarithm is no point.
+fn finite(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    points.retain(|point| point.iter().all(|c| c.is_finite()));
+    points
+}
+
+/// From the first point to the last, where it touches: x^-exponent, in logarithms.
+fn slope(points: &[[f64; 2]], exponent: f64) -> Vec<[f64; 2]> {
+    let (Some(first), Some(last)) = (points.first(), points.last()) else { return vec![] };
+    vec![[first[0], last[1] + exponent * (last[0] - first[0])], *last]
+}
+
+/// Decades, and what lies between them if there are few.
+fn log_marks(input: GridInput) -> Vec<GridMark> {
+    let (first, last) = (input.bounds.0.floor() as i32, input.bounds.1.ceil() as i32);
+    if last - first > 100 {
+        return vec![];
+    }
+    let between = if last - first > 8 { 1 } else { 9 };
+    (first..last)
+        .flat_map(|decade| (1..=between).map(move |digit| (decade, digit)))
+        .map(|(decade, digit)| {
+            let step_size = match digit {
+                1 => 1.0,
+                2 | 5 => 0.35,
+                _ => 0.1,
+            };
+            GridMark { value: f64::from(decade) + f64::from(digit).log10(), step_size }
+        })
+        .filter(|mark| (input.bounds.0..=input.bounds.1).contains(&mark.value))
+        .collect()
+}
+
+/// Decades always; 2 and 5 where few decades are seen.
+fn is_labelled(mark: f64, range: &RangeInclusive<f64>) -> bool {
+    let digit = 10f64.powf(mark - mark.floor());
+    let is = |n: f64| (digit - n).abs() < 1e-6;
+    let decades = range.end() - range.start();
+    is(1.0) || is(10.0) || decades < 1.6 && (is(2.0) || is(5.0))
+}
+
+/// "100", "20k", "3M".
+fn count(n: f64) -> String {
+    match n {
+        n if n >= 0.9e6 => format!("{:.0}M", n / 1e6),
+        n if n >= 0.9e4 => format!("{:.0}k", n / 1e3),
+        n if n >= 0.9 => format!("{n:.0}"),
+        _ => String::new(),
+    }
+}
+
+fn small_number(n: f64) -> String {
+    if n >= 0.9 { count(n) } else { format!("{}", (n * 1e6).round() / 1e6) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample() -> Sample {
+        let record = |iteration: u32| Record {
+            iteration,
+            seconds: 0.5 * f64::from(iteration),
+            radius: 0.01,
+            times: StageTimes { eye: 0.001, photons: 0.002, build: 0.003, gather: 0.004, accumulate: 0.005 },
+            n_photons: 3000,
+            n_paths: 1000,
+        };
+        let measured = |iteration: u32| Measured {
+            iteration,
+            seconds: 0.5 * f64::from(iteration),
+            rel_mse: 1.0 / f64::from(iteration),
+        };
+        Sample {
+            records: [1, 2, 10, 100].map(record).to_vec(),
+            estimated: [10, 100].map(measured).to_vec(),
+            against_reference: vec![],
+        }
+    }
+
+    fn close(a: f64, b: f64) -> bool {
+        (a - b).abs() < 1e-6
+    }
+
+    #[test]
+    fn slopes_touch_the_last_point() {
+        let error = curves(Kind::Error, &sample(), 0.5, false);
+        assert_eq!(
+            error.iter().map(|c| (c.name.as_str(), c.dashed)).collect::<Vec<_>>(),
+            [("noise, estimated", false), ("N^−0.50", true)]
+        );
+        assert_eq!(error[0].points.last(), error[1].points.last());
+        let [[x0, y0], [x1, y1]] = error[1].points[..] else { panic!() };
+        assert!(close((y1 - y0) / (x1 - x0), -0.5) && close(x0, 1.0) && close(x1, 2.0) && close(y1, -2.0));
+        let with_reference = Sample { against_reference: sample().estimated, ..sample() };
+        let names = |alpha| curves(Kind::Error, &with_reference, alpha, true).into_iter().map(|c| c.name).collect();
+        let names: [Vec<String>; 2] = [0.9, 2.0 / 3.0].map(names);
+        assert_eq!(names[0], ["noise, estimated", "t^−0.90", "measured", "t^−0.20"]);
+        assert_eq!((&names[1][1], &names[1][3]), (&"t^−0.67".to_owned(), &"t^−0.67".to_owned()));
+    }
+
+    #[test]
+    fn rates_are_over_what_passed_between_points() {
+        let rate = curves(Kind::Rate, &sample(), 0.5, false);
+        for (curve, expected) in rate.iter().zip([2000f64, 6000.0]) {
+            assert_eq!(curve.points.len(), 4);
+            assert!(curve.points.iter().all(|p| close(p[1], expected.log10())), "{curve:?}");
+        }
+        let stages = curves(Kind::Stages, &sample(), 0.5, true);
+        assert_eq!(stages.iter().map(|c| c.points[3][1].round()).collect::<Vec<_>>(), [1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert!(close(stages[0].points[3][0], 50f64.log10()));
+    }
+
+    #[test]
+    fn what_has_no_logarithm_is_left_out() {
+        let mut sample = sample();
+        sample.records[1].n_photons = 0;
+        sample.estimated[0].rel_mse = 0.0;
+        assert_eq!(curves(Kind::Rate, &sample, 0.5, false)[1].points.len(), 3);
+        assert_eq!(curves(Kind::Error, &sample, 0.5, false)[0].points.len(), 1);
+    }
+
+    #[test]
+    fn marks_of_a_logarithmic_axis() {
+        let marks = log_marks(GridInput { bounds: (-0.2, 1.5), base_step_size: 0.01 });
+        let labels = |range: RangeInclusive<f64>| {
+            marks.iter().filter(|m| is_labelled(m.value, &range)).map(|m| small_number(10f64.powf(m.value))).collect()
+        };
+        let [wide, near]: [Vec<String>; 2] = [-0.2..=1.5, 0.0..=1.2].map(labels);
+        assert_eq!(wide, ["1", "10"]);
+        assert_eq!(near, ["1", "2", "5", "10", "20"]);
+        assert!(log_marks(GridInput { bounds: (-1e9, 1e9), base_step_size: 1.0 }).is_empty());
+        assert_eq!([1e3, 2e4, 5e6].map(count), ["1000", "20k", "5M"]);
+        assert_eq!((Kind::Error.mark(-3.0), Kind::Radius.mark(-3.0)), ("1e-3".to_owned(), "1.00 mm".to_owned()));
+    }
+}

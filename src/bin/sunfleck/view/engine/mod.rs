@@ -1,0 +1,333 @@
+//! What renders behind the window, on threads of its own: the interface says what it wants and looks at what there is,
+//! and never waits.
+//!
+//! The render thread compares what is wanted with what it has and does the least that leads there. What was wanted in
+//! between is never rendered, so that no queue of camera positions can build up.
+
+mod history;
+mod paint;
+mod painting;
+mod session;
+#[cfg(test)]
+mod tests;
+mod worker;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+
+use glam::Vec3;
+use sunfleck::output::Picture;
+use sunfleck::output::display::Look;
+use sunfleck::scene::load::Loaded;
+use sunfleck::scene::settings::Settings;
+
+pub use history::{History, Measured, Record, Series};
+pub use paint::{Comparison, Insides, Legend, Painted, Painting, Values, View};
+pub use session::Frame;
+
+use crate::devices::Device;
+use crate::scenes::Source;
+
+/// Called when there is something new to look at.
+pub type Wake = Arc<dyn Fn() + Send + Sync>;
+
+/// When to pause by itself: whatever comes first; counted since the restart.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Limits {
+    pub iterations: Option<u32>,
+    pub seconds: Option<f64>,
+    /// Estimated relMSE.
+    pub noise: Option<f64>,
+}
+
+/// A scene to open.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choice {
+    /// File, or name of a shipped scene.
+    pub name: String,
+    /// `key=value`, over its settings.
+    pub set: Vec<String>,
+}
+
+/// What the interface wants. Cheap to clone and to compare.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Wanted {
+    pub scene: Option<Arc<Choice>>,
+    /// Counts requests to read the scene again.
+    pub reloads: u32,
+    /// In the place of those that the scene was opened with.
+    pub settings: Option<Arc<Settings>>,
+    /// The camera is moving: quick previews instead of the picture.
+    pub moving: bool,
+    /// Counts restarts.
+    pub restarts: u32,
+    pub paused: bool,
+    /// Iterations to do though paused: grows by one a step.
+    pub steps: u32,
+    /// Counts requests to do again what failed, with the device opened anew if it was lost.
+    pub retries: u32,
+    pub limits: Limits,
+    pub painting: Painting,
+}
+
+/// What the render thread is doing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Phase {
+    #[default]
+    Empty,
+    Loading,
+    /// Packing the scene, taking it to the device.
+    Preparing,
+    /// First photons, for the first radii.
+    Starting,
+    Rendering,
+    Paused,
+    /// A limit was reached.
+    Reached,
+    /// What went wrong, one line.
+    Failed(String),
+}
+
+/// What was read.
+#[derive(Clone, Debug)]
+pub struct Opened {
+    /// With the settings that it was opened with.
+    pub source: Source,
+    /// The settings as their file has them.
+    pub read: Settings,
+    /// As the file has it, before settings.
+    pub loaded: Loaded,
+}
+
+impl Opened {
+    /// Least and greatest corner of the scene as its file has it, metres.
+    pub fn bounds(&self) -> [Vec3; 2] {
+        self.loaded.scene.bounds()
+    }
+
+    /// What renders this scene with `settings` on the command line.
+    pub fn command(&self, settings: &Settings, iterations: u32, output: &Path) -> String {
+        let mut command = format!("sunfleck render {}", crate::render::quote(&self.source.name));
+        for pair in settings.difference(&self.read) {
+            command += &format!(" --set {}", crate::render::quote(&pair));
+        }
+        let output = crate::render::quote(&output.to_string_lossy());
+        format!("{command} --iterations {} -o {output}", iterations.max(1))
+    }
+}
+
+/// A picture to compare with.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    /// For people.
+    pub name: String,
+    pub picture: Picture,
+}
+
+/// What to write, and where.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Save {
+    /// `.exr` or `.png`.
+    pub path: PathBuf,
+    pub look: Look,
+}
+
+/// Something that happened, for people.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Message {
+    Said(String),
+    Warning(String),
+    Error(String),
+}
+
+/// What the threads share. Locks are held for moments.
+#[derive(Default)]
+struct Board {
+    wanted: Wanted,
+    saves: Vec<Save>,
+    reference: Option<Arc<Reference>>,
+    /// Of a picture that the window can show, pixels.
+    most_side: Option<usize>,
+    quit: bool,
+    /// Changes with every restart.
+    estimate: u64,
+    phase: Phase,
+    device: String,
+    opened: Option<Arc<Opened>>,
+    frame: Option<Arc<Frame>>,
+    painted: Option<Arc<Painted>>,
+    history: History,
+    messages: Vec<Message>,
+}
+
+struct Shared {
+    board: Mutex<Board>,
+    changed: Condvar,
+    wake: Wake,
+}
+
+impl Shared {
+    fn board(&self) -> MutexGuard<'_, Board> {
+        // Nothing that holds the lock can leave it half changed.
+        self.board.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Changes what is shared, and tells everybody.
+    fn update<T>(&self, change: impl FnOnce(&mut Board) -> T) -> T {
+        let result = change(&mut self.board());
+        self.changed.notify_all();
+        (self.wake)();
+        result
+    }
+
+    /// Says what is being done, if that is news.
+    fn enter(&self, phase: Phase) {
+        if self.board().phase != phase {
+            self.update(|board| board.phase = phase);
+        }
+    }
+
+    /// Notes what nobody needs to look at by itself.
+    fn note<T>(&self, change: impl FnOnce(&mut Board) -> T) -> T {
+        change(&mut self.board())
+    }
+
+    /// Waits until something changes, unless `ready` already.
+    fn wait_until(&self, mut ready: impl FnMut(&mut Board) -> bool) -> MutexGuard<'_, Board> {
+        let guard = self.board();
+        self.changed.wait_while(guard, |board| !board.quit && !ready(board)).unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Does `work`; a panic in it becomes an error, one line.
+fn catch<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    // What `work` may have left half done is thrown away by those who call this.
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
+        let text = panic.downcast_ref::<&str>().map(ToString::to_string).or(panic.downcast_ref::<String>().cloned());
+        crate::one_line(&format!("a bug in sunfleck: {}", text.unwrap_or_else(|| "panic".to_owned())))
+    })
+}
+
+/// What can be seen at a moment.
+pub struct Now {
+    pub phase: Phase,
+    /// The one under way; changes with every restart.
+    pub estimate: u64,
+    pub device: String,
+    pub opened: Option<Arc<Opened>>,
+    /// The newest film.
+    pub frame: Option<Arc<Frame>>,
+    /// The newest picture of it.
+    pub painted: Option<Arc<Painted>>,
+    pub reference: Option<Arc<Reference>>,
+}
+
+/// The interface's end.
+pub struct Engine {
+    shared: Arc<Shared>,
+    /// What searches the photons: `tree` or `hardware`.
+    index: String,
+    threads: Vec<JoinHandle<()>>,
+}
+
+impl Engine {
+    /// Starts the threads; `wake` is called from them.
+    pub fn start(device: Device, wake: Wake) -> std::io::Result<Self> {
+        let shared = Arc::new(Shared { board: Mutex::default(), changed: Condvar::new(), wake });
+        let index = device.index();
+        let named = |name: &str| std::thread::Builder::new().name(name.to_owned());
+        let (render, paint) = (Arc::clone(&shared), Arc::clone(&shared));
+        let threads = vec![
+            named("render").spawn(move || worker::run(&render, device))?,
+            named("paint").spawn(move || painting::run(&paint))?,
+        ];
+        Ok(Self { shared, index, threads })
+    }
+
+    /// What searches the photons: `tree` or `hardware`.
+    pub fn index(&self) -> &str {
+        &self.index
+    }
+
+    /// Says what is wanted from now on.
+    pub fn want(&self, wanted: &Wanted) {
+        let mut board = self.shared.board();
+        if board.wanted != *wanted {
+            board.wanted = wanted.clone();
+            self.shared.changed.notify_all();
+        }
+    }
+
+    /// Writes the picture as it is, without stopping; a message says how it went.
+    pub fn save(&self, save: Save) {
+        self.shared.board().saves.push(save);
+        self.shared.changed.notify_all();
+    }
+
+    /// Larger pictures are shown reduced, pixels a side.
+    pub fn set_most_side(&self, most_side: usize) {
+        self.shared.board().most_side = Some(most_side);
+    }
+
+    /// What errors are measured against, and pictures compared with.
+    pub fn set_reference(&self, reference: Option<Arc<Reference>>) {
+        let mut board = self.shared.board();
+        board.history.against_reference.clear();
+        board.reference = reference;
+        self.shared.changed.notify_all();
+    }
+
+    /// What other threads set it with.
+    pub fn referee(&self) -> impl Fn(Reference) + Send + 'static {
+        let shared = Arc::clone(&self.shared);
+        move |reference| {
+            shared.update(|board| {
+                board.history.against_reference.clear();
+                board.reference = Some(Arc::new(reference));
+            });
+        }
+    }
+
+    /// What there is.
+    pub fn now(&self) -> Now {
+        let board = self.shared.board();
+        Now {
+            phase: board.phase.clone(),
+            estimate: board.estimate,
+            device: board.device.clone(),
+            opened: board.opened.clone(),
+            frame: board.frame.clone(),
+            painted: board.painted.clone(),
+            reference: board.reference.clone(),
+        }
+    }
+
+    /// Reads the history.
+    pub fn history<T>(&self, read: impl FnOnce(&History) -> T) -> T {
+        read(&self.shared.board().history)
+    }
+
+    /// What other threads say things with.
+    pub fn speaker(&self) -> impl Fn(Message) + Send + 'static {
+        let shared = Arc::clone(&self.shared);
+        move |message| shared.update(|board| board.messages.push(message))
+    }
+
+    /// What has been said since.
+    pub fn take_messages(&self) -> Vec<Message> {
+        std::mem::take(&mut self.shared.board().messages)
+    }
+}
+
+impl Drop for Engine {
+    /// Waits for the stage under way, and for files that are being written.
+    fn drop(&mut self) {
+        self.shared.board().quit = true;
+        self.shared.changed.notify_all();
+        for thread in self.threads.drain(..) {
+            let _ = thread.join();
+        }
+    }
+}

@@ -1,0 +1,456 @@
+//! From a film to what the window shows.
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use rayon::prelude::*;
+use sunfleck::inspect::{self, FirstHits};
+use sunfleck::layout::Photon;
+use sunfleck::output::Picture;
+use sunfleck::output::compare::{Difference, compare};
+use sunfleck::output::convergence::Halves;
+use sunfleck::output::difference::{self, Measure};
+use sunfleck::output::display::{self, Look};
+use sunfleck::output::false_colour::{self, Scale};
+use sunfleck::output::flip::{self, flip};
+use sunfleck::output::histogram::Histogram;
+use sunfleck::output::tonemap::srgb_encode;
+use sunfleck::ppm::film::luminance;
+
+use super::{Frame, Reference};
+
+/// What is shown of a render.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum View {
+    #[default]
+    Picture,
+    /// Luminance in stops about mid grey, in false colour.
+    Stops,
+    Direct,
+    Caustic,
+    Indirect,
+    Albedo,
+    Normal,
+    Depth,
+    PhotonCount,
+    Radius,
+    Variance,
+    NodesVisited,
+}
+
+impl View {
+    pub const ALL: [Self; 12] = [
+        Self::Picture,
+        Self::Stops,
+        Self::Direct,
+        Self::Caustic,
+        Self::Indirect,
+        Self::Albedo,
+        Self::Normal,
+        Self::Depth,
+        Self::PhotonCount,
+        Self::Radius,
+        Self::Variance,
+        Self::NodesVisited,
+    ];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Picture => "Picture",
+            Self::Stops => "False colour",
+            Self::Direct => "Direct light",
+            Self::Caustic => "Caustics",
+            Self::Indirect => "Indirect light",
+            Self::Albedo => "Albedo",
+            Self::Normal => "Normal",
+            Self::Depth => "Depth",
+            Self::PhotonCount => "Gathered photons",
+            Self::Radius => "Radius",
+            Self::Variance => "Variance",
+            Self::NodesVisited => "Nodes visited",
+        }
+    }
+
+    /// For people.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Self::Picture => "what is rendered",
+            Self::Stops => "luminance in stops about mid grey, after exposure",
+            Self::Direct => "what the eye path finds, and the light sampled at its end",
+            Self::Caustic => "photons that met only mirrors and glass since the lamp",
+            Self::Indirect => "all other photons",
+            Self::Albedo => "base colour of what is seen first",
+            Self::Normal => "shading normal of what is seen first, world space",
+            Self::Depth => "distance of what is seen first along the view, metres",
+            Self::PhotonCount => "photons in a pixel's estimate, mean over iterations",
+            Self::Radius => "radius of the estimate, metres",
+            Self::Variance => "estimated variance of the pixel's mean luminance",
+            Self::NodesVisited => "nodes of the tree entered to gather a pixel",
+        }
+    }
+
+    /// Whether it is made from an iteration's photons, read back.
+    pub fn needs_photons(self) -> bool {
+        matches!(self, Self::Direct | Self::Caustic | Self::Indirect | Self::PhotonCount | Self::NodesVisited)
+    }
+}
+
+/// How the picture is set beside the reference.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Comparison {
+    #[default]
+    Off,
+    /// The reference right of a line; the window draws it.
+    Wipe,
+    Difference(Measure),
+    /// FLIP, of both as they are shown.
+    Flip,
+}
+
+/// Of an iteration, read back from the device.
+#[derive(Debug, Default)]
+pub struct Insides {
+    pub split: inspect::Split,
+    pub nodes_visited: Vec<u32>,
+    pub photons: Vec<Photon>,
+}
+
+/// The numbers behind the colours.
+#[derive(Clone, Debug)]
+pub enum Values {
+    Rgb(Arc<Vec<[f32; 3]>>),
+    Scalar(Arc<Vec<f32>>),
+}
+
+/// What the colours of a scalar mean.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Legend {
+    pub range: [f32; 2],
+    pub log: bool,
+    /// Green to red about 0.
+    pub signed: bool,
+}
+
+/// What of `Wanted` a painting depends on.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Painting {
+    pub look: Look,
+    pub view: View,
+    pub comparison: Comparison,
+    /// Photons drawn over the picture.
+    pub photons: Option<inspect::ColorBy>,
+}
+
+impl Painting {
+    /// Whether it is made from an iteration's photons, read back.
+    pub fn looks_inside(&self) -> bool {
+        self.view.needs_photons() || self.photons.is_some()
+    }
+}
+
+/// A picture for the window.
+#[derive(Debug)]
+pub struct Painted {
+    /// Pixels.
+    pub size: [usize; 2],
+    /// sRGB-encoded, opaque, row-major.
+    pub rgba: Vec<u8>,
+    /// What it was made from.
+    pub frame: Arc<Frame>,
+    pub painting: Painting,
+    /// Stops; found automatically if the look has none.
+    pub exposure: f32,
+    pub values: Values,
+    pub legend: Option<Legend>,
+    pub histogram: Histogram,
+    /// The reference as the picture is shown.
+    pub reference: Option<(Arc<Reference>, Vec<u8>)>,
+    /// Mean of the comparison that is shown.
+    pub mean: Option<f64>,
+    /// The film against the reference; none of a preview.
+    pub figures: Option<Difference>,
+    /// Why what was wanted could not be painted.
+    pub problem: Option<String>,
+    /// In the place of what is too large for a texture.
+    pub reduced: Option<Reduced>,
+}
+
+/// A picture with fewer pixels, for a window whose textures are small.
+#[derive(Debug)]
+pub struct Reduced {
+    pub size: [usize; 2],
+    pub rgba: Vec<u8>,
+    /// The reference, as small.
+    pub reference: Option<Vec<u8>>,
+}
+
+impl Painted {
+    /// What fits into a texture: size, and bytes as in `rgba`.
+    pub fn texture(&self) -> ([usize; 2], &[u8]) {
+        self.reduced.as_ref().map_or((self.size, &self.rgba), |reduced| (reduced.size, &reduced.rgba))
+    }
+
+    /// The same of the reference, whose size is the picture's.
+    pub fn reference_texture(&self) -> Option<([usize; 2], &[u8])> {
+        let (_, rgba) = self.reference.as_ref()?;
+        match &self.reduced {
+            Some(reduced) => Some((reduced.size, reduced.reference.as_deref()?)),
+            None => Some((self.size, rgba)),
+        }
+    }
+
+    pub fn reduce(&mut self, most_side: Option<usize>) {
+        let Some(most) = most_side.filter(|&most| self.size.iter().any(|&side| side > most)) else { return };
+        let (size, rgba) = reduced(self.size, &self.rgba, most);
+        let reference = self.reference.as_ref().map(|(_, rgba)| reduced(self.size, rgba, most).1);
+        self.reduced = Some(Reduced { size, rgba, reference });
+    }
+
+    /// Of a pixel: red, green and blue, or one number.
+    pub fn value(&self, x: usize, y: usize) -> Vec<f32> {
+        let i = y * self.size[0] + x;
+        match &self.values {
+            Values::Rgb(values) => values.get(i).map(|v| v.to_vec()).unwrap_or_default(),
+            Values::Scalar(values) => values.get(i).map(|&v| vec![v]).unwrap_or_default(),
+        }
+    }
+}
+
+/// The reference, if it has the picture's size.
+pub fn fitting<'a>(reference: Option<&'a Arc<Reference>>, frame: &Frame) -> Option<&'a Arc<Reference>> {
+    reference.filter(|r| (r.picture.size, r.picture.crop) == (frame.params.size, frame.params.crop))
+}
+
+/// What [`View::Stops`] spans, about mid grey.
+const STOPS: [f32; 2] = [-8.0, 8.0];
+
+/// What is kept from frame to frame.
+#[derive(Default)]
+pub struct Painter {
+    halves: (u64, Halves),
+    hits: Option<(Arc<Frame>, FirstHits)>,
+}
+
+/// Colours, and what they stand for.
+struct Colours {
+    rgba: Vec<u8>,
+    values: Values,
+    legend: Option<Legend>,
+    mean: Option<f64>,
+}
+
+impl Painter {
+    pub fn is_empty(&self) -> bool {
+        self.hits.is_none() && self.halves.1 == Halves::default()
+    }
+
+    /// Error estimated from the halves, and measured against the reference.
+    pub fn measure(&mut self, frame: &Frame, reference: Option<&Reference>) -> (Option<f64>, Option<Difference>) {
+        // What another scene left would keep that scene in memory.
+        self.hits = self.hits.take().filter(|(of, _)| Arc::ptr_eq(&of.scene, &frame.scene));
+        if frame.is_preview {
+            return (None, None);
+        }
+        if self.halves.0 != frame.estimate {
+            self.halves = (frame.estimate, Halves::default());
+        }
+        self.halves.1.add(&frame.film);
+        let measured = reference.and_then(|r| compare(&frame.picture(), &r.picture).ok());
+        (self.halves.1.rel_mse(), measured)
+    }
+
+    pub fn paint(&mut self, frame: &Arc<Frame>, reference: Option<Arc<Reference>>, painting: Painting) -> Painted {
+        let picture = frame.picture();
+        let exposure = painting.look.exposure_of(&picture.rgb);
+        let tonemap = painting.look.tonemap;
+        let reference = fitting(reference.as_ref(), frame).map(|reference| {
+            let mut rgba = vec![];
+            match painting.view {
+                View::Stops => {
+                    false_colour::luminance_in_stops(&reference.picture.rgb, exposure, STOPS, &mut rgba);
+                }
+                _ => display::rgba8(&reference.picture, exposure, tonemap, &mut rgba),
+            }
+            (Arc::clone(reference), rgba)
+        });
+        let histogram = Histogram::of(&picture.rgb, exposure);
+        let mut problem = None;
+        let compared = reference.as_ref().and_then(|(reference, _)| {
+            let done = compared(&picture, &reference.picture, &painting, exposure).transpose()?;
+            done.map_err(|error| problem = Some(error)).ok()
+        });
+        let mut colours = match compared {
+            Some(colours) => colours,
+            None => self.view(frame, picture, painting, exposure),
+        };
+        if let (Some(color), Some(insides)) = (painting.photons, &frame.insides) {
+            let style = inspect::Style { color, ..Default::default() };
+            let dots = inspect::draw(&insides.photons, self.hits(frame), &style);
+            for (to, from) in colours.rgba.chunks_exact_mut(4).zip(&dots) {
+                if from[3] > 0 {
+                    to[..3].copy_from_slice(&from[..3]);
+                }
+            }
+        }
+        Painted {
+            size: frame.params.film_size().map(|n| n as usize),
+            rgba: colours.rgba,
+            frame: Arc::clone(frame),
+            painting,
+            exposure,
+            values: colours.values,
+            legend: colours.legend,
+            histogram,
+            reference,
+            mean: colours.mean,
+            figures: None,
+            problem,
+            reduced: None,
+        }
+    }
+
+    fn view(&mut self, frame: &Arc<Frame>, picture: Picture, painting: Painting, exposure: f32) -> Colours {
+        let part = |pick: fn(&inspect::Parts) -> [f32; 3]| {
+            frame.insides.as_ref().map(|insides| insides.split.pixels.iter().map(pick).collect::<Vec<_>>())
+        };
+        let as_picture = |rgb: Vec<[f32; 3]>| {
+            let picture = Picture { rgb, size: frame.params.size, crop: frame.params.crop, variance: None };
+            let mut rgba = vec![];
+            display::rgba8(&picture, exposure, painting.look.tonemap, &mut rgba);
+            Colours { rgba, values: Values::Rgb(Arc::new(picture.rgb)), legend: None, mean: None }
+        };
+        // Until the first iteration with photons has been read back, the picture stands for them.
+        let lit = |rgb: Option<Vec<[f32; 3]>>, picture: Picture| as_picture(rgb.unwrap_or(picture.rgb));
+        match painting.view {
+            View::Picture => as_picture(picture.rgb),
+            View::Stops => {
+                let mut rgba = vec![];
+                false_colour::luminance_in_stops(&picture.rgb, exposure, STOPS, &mut rgba);
+                let stops = |&rgb: &[f32; 3]| (luminance(rgb).max(0.0) / false_colour::MID_GREY).log2() + exposure;
+                let values = Values::Scalar(Arc::new(picture.rgb.iter().map(stops).collect()));
+                let legend = Some(Legend { range: STOPS, log: false, signed: false });
+                Colours { rgba, values, legend, mean: None }
+            }
+            View::Direct => lit(part(|p| p.direct), picture),
+            View::Caustic => lit(part(|p| p.caustic), picture),
+            View::Indirect => lit(part(|p| p.indirect), picture),
+            View::Albedo => plain(self.hits(frame).base_colors(), |rgb| rgb.map(srgb_encode)),
+            // As in normal maps; black where nothing is hit.
+            View::Normal => plain(self.hits(frame).normals(), |n| match n {
+                [0.0, 0.0, 0.0] => n,
+                _ => n.map(|c| 0.5 * c + 0.5),
+            }),
+            View::Depth => {
+                let mut colours = scalar(self.hits(frame).depths(), false);
+                far(&mut colours);
+                colours
+            }
+            View::PhotonCount | View::NodesVisited => {
+                let Some(insides) = &frame.insides else { return as_picture(picture.rgb) };
+                match painting.view {
+                    View::PhotonCount => scalar(insides.split.pixels.iter().map(|p| p.gathered).collect(), true),
+                    _ => scalar(insides.nodes_visited.iter().map(|&n| n as f32).collect(), false),
+                }
+            }
+            View::Radius => {
+                let scale = frame.radius / frame.first_radius.max(f32::MIN_POSITIVE);
+                scalar(frame.first_radii.iter().map(|r| r * scale).collect(), true)
+            }
+            // One iteration has none.
+            View::Variance if frame.film.n_iterations < 2 => as_picture(picture.rgb),
+            View::Variance => scalar(frame.film.variance_of_mean(), true),
+        }
+    }
+
+    fn hits(&mut self, frame: &Arc<Frame>) -> &FirstHits {
+        let same = |of: &Frame| {
+            Arc::ptr_eq(&of.scene, &frame.scene)
+                && of.camera == frame.camera
+                && (of.params.size, of.params.crop) == (frame.params.size, frame.params.crop)
+        };
+        let kept = self.hits.take().filter(|(of, _)| same(of));
+        let (_, hits) = self
+            .hits
+            .insert(kept.unwrap_or_else(|| (Arc::clone(frame), FirstHits::trace(&frame.scene, &frame.view()))));
+        hits
+    }
+}
+
+/// Means of squares of pixels, so many that no side is longer than `most` pixels.
+fn reduced(size: [usize; 2], rgba: &[u8], most: usize) -> ([usize; 2], Vec<u8>) {
+    let factor = size[0].max(size[1]).div_ceil(most.max(1)).max(1);
+    let small = size.map(|side| side.div_ceil(factor));
+    let mut bytes = vec![0; 4 * small[0] * small[1]];
+    bytes.par_chunks_exact_mut(4).enumerate().for_each(|(i, to)| {
+        let [x0, y0] = [factor * (i % small[0]), factor * (i / small[0])];
+        let (mut sum, mut n) = ([0u32; 4], 0);
+        for y in y0..(y0 + factor).min(size[1]) {
+            for x in x0..(x0 + factor).min(size[0]) {
+                let from = 4 * (y * size[0] + x);
+                sum.iter_mut().zip(&rgba[from..from + 4]).for_each(|(sum, &c)| *sum += u32::from(c));
+                n += 1;
+            }
+        }
+        to.iter_mut().zip(sum).for_each(|(to, sum)| *to = ((sum + n / 2) / n.max(1)) as u8);
+    });
+    (small, bytes)
+}
+
+/// Nothing if no comparison is wanted that is painted here.
+fn compared(
+    picture: &Picture,
+    reference: &Picture,
+    painting: &Painting,
+    exposure: f32,
+) -> Result<Option<Colours>, String> {
+    let mut rgba = vec![];
+    let (values, legend, mean) = match painting.comparison {
+        Comparison::Off | Comparison::Wipe => return Ok(None),
+        Comparison::Difference(measure) => {
+            let image = difference::image(picture, reference, measure)?;
+            let legend = if measure == Measure::Signed {
+                let most = false_colour::signed(&image.values, None, &mut rgba);
+                Legend { range: [-most, most], log: false, signed: true }
+            } else {
+                // Black is no difference.
+                let range = [0.0, false_colour::automatic_range(&image.values, false)[1]];
+                let range = false_colour::scalar(&image.values, &Scale { range: Some(range), log: false }, &mut rgba);
+                Legend { range, log: false, signed: false }
+            };
+            (image.values, legend, image.mean)
+        }
+        Comparison::Flip => {
+            let size = picture.crop_size();
+            let [x, y] = [picture, reference].map(|p| display::linear(&p.rgb, exposure, painting.look.tonemap));
+            let flip = flip(&x, &y, size, flip::PIXELS_PER_DEGREE)?;
+            let range = false_colour::scalar(&flip.error, &Scale { range: Some([0.0, 1.0]), log: false }, &mut rgba);
+            (flip.error, Legend { range, log: false, signed: false }, flip.mean)
+        }
+    };
+    Ok(Some(Colours { rgba, values: Values::Scalar(Arc::new(values)), legend: Some(legend), mean: Some(mean) }))
+}
+
+/// Numbers in false colour.
+fn scalar(values: Vec<f32>, log: bool) -> Colours {
+    let mut rgba = vec![];
+    let range = false_colour::scalar(&values, &Scale { range: None, log }, &mut rgba);
+    let legend = Some(Legend { range, log, signed: false });
+    Colours { rgba, values: Values::Scalar(Arc::new(values)), legend, mean: None }
+}
+
+/// What is endlessly far away looks like what is farthest.
+fn far(colours: &mut Colours) {
+    let Values::Scalar(depths) = &colours.values else { return };
+    for (rgba, depth) in colours.rgba.chunks_exact_mut(4).zip(depths.iter()) {
+        if *depth == f32::INFINITY {
+            rgba.copy_from_slice(&false_colour::colour(1.0));
+        }
+    }
+}
+
+/// Three numbers as the colour that `encoded` makes of them, in [0, 1].
+fn plain(values: Vec<[f32; 3]>, encoded: fn([f32; 3]) -> [f32; 3]) -> Colours {
+    let byte = |c: f32| (255.0 * c.clamp(0.0, 1.0) + 0.5) as u8;
+    let rgba = values.iter().map(|&v| encoded(v).map(byte)).flat_map(|[r, g, b]| [r, g, b, 255]).collect();
+    Colours { rgba, values: Values::Rgb(Arc::new(values)), legend: None, mean: None }
+}

@@ -1,0 +1,233 @@
+//! One scene on one device: an estimate under way.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use sunfleck::inspect::{self, Split};
+use sunfleck::layout::Camera;
+use sunfleck::output::Picture;
+use sunfleck::ppm::{self, Error, Film, Params, Stages};
+use sunfleck::scene::PackedScene;
+use sunfleck::scene::settings::Settings;
+
+use super::{Insides, Opened, Record, Wanted};
+use crate::devices::Device;
+use crate::job::Input;
+
+/// Of the picture's width and height, while the camera moves.
+const PREVIEW: u32 = 4;
+/// Photon paths of a preview.
+const PREVIEW_PATHS: u32 = 20_000;
+/// A dispatch's, so that the window's frames find their place between them.
+const DISPATCH_SECONDS: f64 = 0.01;
+/// Between films that are read back.
+const SHOW_EVERY: Duration = Duration::from_millis(80);
+/// Iterations that are shown at once.
+const SHOW_FIRST: u32 = 3;
+
+/// A film, and what made it.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Changes with every restart.
+    pub estimate: u64,
+    pub film: Arc<Film>,
+    /// Smaller than wanted, while the camera moves.
+    pub is_preview: bool,
+    pub params: Params,
+    pub camera: Camera,
+    pub scene: Arc<PackedScene>,
+    /// What it is an estimate of.
+    pub opened: Arc<Opened>,
+    pub settings: Arc<Settings>,
+    /// `[h·w]`, metres.
+    pub first_radii: Arc<Vec<f32>>,
+    /// Read back only where something shown needs it.
+    pub insides: Option<Arc<Insides>>,
+    /// Median of the first radii and of those now, metres.
+    pub first_radius: f32,
+    pub radius: f32,
+    /// Since the restart, pauses left out.
+    pub seconds: f64,
+}
+
+impl Frame {
+    /// The film as a picture.
+    pub fn picture(&self) -> Picture {
+        Picture { size: self.params.size, crop: self.params.crop, rgb: self.film.rgb(), variance: None }
+    }
+
+    /// The camera as a pinhole, and the film behind it.
+    pub fn view(&self) -> inspect::View {
+        inspect::View::new(self.camera, self.params.size, self.params.crop)
+    }
+}
+
+/// What was shown last.
+struct Shown {
+    when: Instant,
+    n_iterations: u32,
+    insides: bool,
+}
+
+/// See the module.
+pub struct Session {
+    pub opened: Arc<Opened>,
+    pub input: Input,
+    /// What `input` was made with.
+    pub settings: Arc<Settings>,
+    scene: Arc<PackedScene>,
+    stages: Box<dyn Stages>,
+    estimate: u64,
+    params: Params,
+    is_preview: bool,
+    radii: Arc<Vec<f32>>,
+    split: Split,
+    first_radius: f32,
+    /// Done in this estimate.
+    pub n_iterations: u32,
+    pub seconds: f64,
+    shown: Option<Shown>,
+}
+
+impl Session {
+    pub fn new(device: &Device, opened: Arc<Opened>, settings: Arc<Settings>, input: Input) -> Result<Self> {
+        let scene = Arc::new(PackedScene::new(&input.scene));
+        let stages = device.stages_of(Arc::clone(&scene), &input, Some(DISPATCH_SECONDS))?;
+        let params = input.params.clone();
+        Ok(Self {
+            opened,
+            input,
+            settings,
+            scene,
+            stages,
+            estimate: 0,
+            params,
+            is_preview: false,
+            radii: Arc::default(),
+            split: Split::default(),
+            first_radius: 0.0,
+            n_iterations: 0,
+            seconds: 0.0,
+            shown: None,
+        })
+    }
+
+    /// Begins anew: another camera perhaps, other parameters, or a preview. `estimate` names it.
+    pub fn restart(&mut self, estimate: u64, is_preview: bool) -> Result<(), Error> {
+        self.params = self.input.params.clone();
+        if is_preview {
+            self.params.size = self.params.size.map(|side| side.div_ceil(PREVIEW));
+            let [width, height] = self.params.size;
+            self.params.crop = [0, 0, width, height];
+            self.params.n_paths = self.params.n_paths.min(PREVIEW_PATHS);
+        }
+        let [width, height] = self.params.size;
+        self.stages.set_camera(self.input.camera.pack(width, height), self.params.film_size())?;
+        (self.estimate, self.is_preview) = (estimate, is_preview);
+        (self.n_iterations, self.seconds, self.shown) = (0, 0.0, None);
+        self.split = Split::default();
+        self.radii = Arc::new(ppm::start(&mut *self.stages, &self.params)?);
+        let mut radii: Vec<f32> = self.radii.iter().copied().filter(|r| *r > 0.0 && r.is_finite()).collect();
+        let middle = radii.len() / 2;
+        self.first_radius =
+            if radii.is_empty() { 0.0 } else { *radii.select_nth_unstable_by(middle, f32::total_cmp).1 };
+        Ok(())
+    }
+
+    /// One iteration, its stages in the order of [`ppm::iterate`]; none if `is_stale` says between two of them that its
+    /// picture is not wanted any more.
+    pub fn iterate(&mut self, mut is_stale: impl FnMut() -> bool) -> Result<Option<Record>, Error> {
+        type Stage = fn(&mut dyn Stages, &sunfleck::layout::Frame) -> Result<(), Error>;
+        const STAGES: [Stage; 5] = [
+            |stages, frame| stages.trace_eye(frame),
+            |stages, frame| stages.trace_photons(frame),
+            |stages, frame| stages.build_index(frame),
+            |stages, frame| stages.gather(frame),
+            |stages, frame| stages.accumulate(frame),
+        ];
+        let began = Instant::now();
+        let frame = self.params.frame(self.n_iterations + 1);
+        for stage in STAGES {
+            if is_stale() {
+                return Ok(None);
+            }
+            stage(&mut *self.stages, &frame)?;
+        }
+        let times = self.stages.times()?;
+        self.n_iterations += 1;
+        self.seconds += began.elapsed().as_secs_f64();
+        Ok(Some(Record {
+            iteration: self.n_iterations,
+            seconds: self.seconds,
+            radius: self.first_radius * frame.radius_scale,
+            times,
+            n_photons: self.stages.n_photons(),
+            n_paths: self.params.n_paths,
+        }))
+    }
+
+    /// Whether something wanted is not in what was shown last.
+    pub fn owes(&self, look_inside: bool) -> bool {
+        self.n_iterations > 0
+            && self.shown.as_ref().is_none_or(|s| s.n_iterations < self.n_iterations || look_inside && !s.insides)
+    }
+
+    /// The film, if it is time to show it, or if there will be no more; with its insides, if `look_inside`.
+    pub fn frame_if_due(&mut self, is_last: bool, look_inside: bool) -> Result<Option<Frame>, Error> {
+        let is_due = is_last
+            || self.n_iterations <= SHOW_FIRST
+            || self.shown.as_ref().is_none_or(|shown| shown.when.elapsed() >= SHOW_EVERY);
+        if !is_due || !self.owes(look_inside) {
+            return Ok(None);
+        }
+        let mut frame = self.frame()?;
+        if look_inside {
+            frame.insides = Some(Arc::new(self.insides()?));
+        }
+        self.shown = Some(Shown { when: Instant::now(), n_iterations: self.n_iterations, insides: look_inside });
+        Ok(Some(frame))
+    }
+
+    /// The film as it is.
+    pub fn frame(&mut self) -> Result<Frame, Error> {
+        Ok(Frame {
+            estimate: self.estimate,
+            film: Arc::new(self.stages.film()?),
+            is_preview: self.is_preview,
+            params: self.params.clone(),
+            camera: self.stages.camera(),
+            scene: Arc::clone(&self.scene),
+            opened: Arc::clone(&self.opened),
+            settings: Arc::clone(&self.settings),
+            first_radii: Arc::clone(&self.radii),
+            insides: None,
+            first_radius: self.first_radius,
+            radius: self.first_radius * ppm::RadiusSchedule::new(self.params.alpha).scale(self.n_iterations.max(1)),
+            seconds: self.seconds,
+        })
+    }
+
+    /// Of the last iteration; its light is added to the mean of those looked into before.
+    fn insides(&mut self) -> Result<Insides, Error> {
+        let frame = self.params.frame(self.n_iterations);
+        let (vertices, photons) = (self.stages.eye_vertices()?, self.stages.photons()?);
+        let iteration = inspect::Iteration::new(&self.scene, &frame, &vertices, &self.radii, &photons);
+        self.split.add(&iteration.split());
+        let nodes_visited = iteration.nodes_visited();
+        Ok(Insides { split: self.split.clone(), nodes_visited, photons })
+    }
+
+    /// Whether a limit is reached.
+    pub fn is_done(&self, wanted: &Wanted, noise: Option<f64>) -> bool {
+        let limits = &wanted.limits;
+        !self.is_preview
+            && (limits.iterations.is_some_and(|n| self.n_iterations >= n)
+                || limits.seconds.is_some_and(|s| self.seconds >= s)
+                || limits.noise.zip(noise).is_some_and(|(limit, noise)| noise <= limit))
+    }
+
+    pub fn device(&self) -> String {
+        self.stages.device()
+    }
+}

@@ -1,0 +1,285 @@
+//! The engine without a window, on the CPU.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use sunfleck::cpu::CpuStages;
+use sunfleck::output::exr;
+use sunfleck::ppm::{self, Film, Stages};
+use sunfleck::scene::PackedScene;
+use sunfleck::scene::settings::CameraSettings;
+
+use super::*;
+use crate::cli::InputArgs;
+use crate::scenes::Source;
+
+const PATIENCE: Duration = Duration::from_secs(60);
+
+struct Bench {
+    engine: Engine,
+    wanted: Wanted,
+    wakes: Arc<AtomicUsize>,
+}
+
+impl Bench {
+    /// Opens a small picture of a scene, with limits.
+    fn open(name: &str, limits: Limits) -> Self {
+        Self::open_on(Device::Cpu, name, limits)
+    }
+
+    fn open_on(device: Device, name: &str, limits: Limits) -> Self {
+        let wakes = Arc::new(AtomicUsize::new(0));
+        let count = Arc::clone(&wakes);
+        let wake: Wake = Arc::new(move || {
+            count.fetch_add(1, Ordering::Relaxed);
+        });
+        let engine = Engine::start(device, wake).unwrap();
+        let mut bench = Self { engine, wanted: Wanted { limits, ..Wanted::default() }, wakes };
+        bench.choose(name, &["size=32x32", "photons=2000"]);
+        bench
+    }
+
+    fn choose(&mut self, name: &str, set: &[&str]) {
+        let set = set.iter().map(ToString::to_string).collect();
+        self.wanted.scene = Some(Arc::new(Choice { name: name.to_owned(), set }));
+        self.send();
+    }
+
+    fn send(&mut self) {
+        self.engine.want(&self.wanted);
+    }
+
+    /// Changes settings, from those that are in use.
+    fn set(&mut self, change: impl FnOnce(&mut Settings)) {
+        let opened = self.engine.now().opened.expect("a scene");
+        let mut settings = self.wanted.settings.as_deref().unwrap_or(&opened.source.settings).clone();
+        change(&mut settings);
+        self.wanted.settings = Some(Arc::new(settings));
+        self.send();
+    }
+
+    fn wait(&self, what: &str, mut ready: impl FnMut(&Now) -> bool) -> Now {
+        let began = Instant::now();
+        loop {
+            let now = self.engine.now();
+            if ready(&now) {
+                return now;
+            }
+            assert!(began.elapsed() < PATIENCE, "{what}: still {:?} after {PATIENCE:?}", now.phase);
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    fn wait_for(&self, phase: &Phase) -> Now {
+        self.wait(&format!("{phase:?}"), |now| now.phase == *phase)
+    }
+
+    /// A rest with so many iterations shown.
+    fn wait_for_film(&self, phase: &Phase, n: u32) -> Now {
+        self.wait(&format!("{phase:?} with {n} iterations"), |now| now.phase == *phase && iterations(now) == Some(n))
+    }
+
+    fn save(&self, path: &Path) -> Message {
+        self.engine.take_messages();
+        self.engine.save(Save { path: path.to_owned(), look: Look::default() });
+        let mut said = vec![];
+        self.wait("saving", |_| {
+            said.extend(self.engine.take_messages());
+            !said.is_empty()
+        });
+        said.remove(0)
+    }
+
+    fn records(&self) -> Vec<u32> {
+        self.engine.history(|h| h.records.sample(usize::MAX).iter().map(|r| r.iteration).collect())
+    }
+}
+
+fn iterations(now: &Now) -> Option<u32> {
+    now.frame.as_ref().map(|frame| frame.film.n_iterations)
+}
+
+fn until(n: u32) -> Limits {
+    Limits { iterations: Some(n), ..Limits::default() }
+}
+
+/// What `sunfleck render` makes of the same settings.
+fn rendered(settings: &Settings, n: u32) -> Film {
+    let source = Source::resolve("cornell").unwrap();
+    let input = crate::job::prepare(&source, settings, source.scene().unwrap(), &InputArgs::default()).unwrap();
+    let scene = PackedScene::new(&input.scene);
+    let [width, height] = input.params.size;
+    let mut stages = CpuStages::new(scene.into(), input.camera.pack(width, height), input.params.film_size());
+    ppm::start(&mut stages, &input.params).unwrap();
+    for i in 1..=n {
+        ppm::iterate(&mut stages, &input.params.frame(i)).unwrap();
+    }
+    stages.film().unwrap()
+}
+
+#[test]
+fn a_saved_picture_is_that_of_render_bit_for_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    let mut bench = Bench::open("cornell", until(5));
+    let first = bench.wait_for_film(&Phase::Reached, 5);
+    let settings = first.opened.as_ref().unwrap().source.settings.clone();
+    assert!(matches!(bench.save(&path), Message::Said(_)));
+    assert_eq!(exr::read(&path).unwrap().rgb, rendered(&settings, 5).rgb());
+    assert_eq!(bench.records(), [1, 2, 3, 4, 5]);
+
+    // Another camera, looked for through a preview; then the same again by a restart.
+    let moved = |settings: &mut Settings| {
+        let opened = first.opened.as_ref().unwrap();
+        let mut camera = settings.camera_of(&opened.loaded.scene).unwrap();
+        camera.world_from_camera.translation.x += 0.05;
+        settings.camera = Some(CameraSettings::from(&camera));
+    };
+    bench.wanted.moving = true;
+    bench.set(moved);
+    bench.wait("a preview", |now| now.frame.as_ref().is_some_and(|f| f.is_preview && f.params.size == [8, 8]));
+    bench.wanted.moving = false;
+    bench.send();
+    let second = bench.wait("the picture", |now| {
+        now.phase == Phase::Reached && now.frame.as_ref().is_some_and(|f| !f.is_preview && f.film.n_iterations == 5)
+    });
+    let settings = bench.wanted.settings.as_deref().unwrap().clone();
+    let film = rendered(&settings, 5);
+    assert_eq!(*second.frame.as_ref().unwrap().film, film);
+    bench.wanted.restarts += 1;
+    bench.send();
+    let again = bench.wait("the restart", |now| {
+        now.phase == Phase::Reached && iterations(now) == Some(5) && now.estimate > second.estimate
+    });
+    assert_eq!(*again.frame.unwrap().film, film);
+    assert!(matches!(bench.save(&path), Message::Said(_)));
+    assert_eq!(exr::read(&path).unwrap().rgb, film.rgb());
+    let nowhere = folder.path().join("none/a.exr");
+    assert!(matches!(bench.save(&nowhere), Message::Error(text) if text.contains("none")));
+}
+
+#[test]
+fn pauses_steps_and_limits_count_exactly() {
+    let mut bench = Bench::open("cornell", until(3));
+    bench.wait_for_film(&Phase::Reached, 3);
+    bench.wanted.limits = until(4);
+    bench.send();
+    bench.wait_for_film(&Phase::Reached, 4);
+    bench.wanted.paused = true;
+    bench.send();
+    bench.wait_for(&Phase::Paused);
+    bench.wanted.steps += 3;
+    bench.send();
+    bench.wait_for_film(&Phase::Paused, 7);
+    // A restart in a pause shows the first picture of it.
+    bench.wanted.restarts += 1;
+    bench.send();
+    let now = bench.wait_for_film(&Phase::Paused, 1);
+    assert_eq!(bench.records(), [1]);
+    bench.wanted.limits = Limits { seconds: Some(1e-9), ..Limits::default() };
+    bench.wanted.paused = false;
+    bench.send();
+    assert_eq!(iterations(&bench.wait_for(&Phase::Reached)), iterations(&now));
+    // The noise is known from the second iteration on.
+    bench.wanted.limits = Limits { noise: Some(1e9), ..Limits::default() };
+    bench.send();
+    let now = bench.wait("the noise", |now| now.phase == Phase::Reached && iterations(now).is_some_and(|n| n >= 2));
+    let noise = bench.engine.history(|h| h.estimated.last().copied()).unwrap();
+    assert!(noise.iteration <= iterations(&now).unwrap() && noise.rel_mse > 0.0);
+    // Nothing goes on, nobody is woken.
+    bench.wait("the last picture", |now| match (&now.painted, &now.frame) {
+        (Some(painted), Some(frame)) => now.phase == Phase::Reached && Arc::ptr_eq(&painted.frame, frame),
+        _ => false,
+    });
+    std::thread::sleep(Duration::from_millis(100));
+    let wakes = bench.wakes.load(Ordering::Relaxed);
+    std::thread::sleep(Duration::from_millis(300));
+    assert_eq!(bench.wakes.load(Ordering::Relaxed), wakes);
+}
+
+#[test]
+fn what_fails_can_be_put_right() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    let mut bench = Bench::open(&path.to_string_lossy(), until(2));
+    let failed = |now: &Now| matches!(&now.phase, Phase::Failed(text) if text.contains("scene.toml"));
+    bench.wait("the error", failed);
+    // It is there now.
+    std::fs::write(&path, "scene = \"cornell\"\n").unwrap();
+    bench.wanted.retries += 1;
+    bench.send();
+    let good = bench.wait_for_film(&Phase::Reached, 2);
+    // Settings that cannot be: the last film stays, and can be saved.
+    bench.set(|settings| {
+        settings.camera = Some(CameraSettings { name: Some("no such".to_owned()), ..Default::default() })
+    });
+    let bad = bench.wait("the error", |now| matches!(&now.phase, Phase::Failed(text) if text.contains("no such")));
+    assert_eq!(iterations(&bad), Some(2));
+    assert!(matches!(bench.save(&folder.path().join("a.exr")), Message::Said(_)));
+    bench.set(|settings| settings.camera = None);
+    let again = bench.wait("the picture", |now| now.phase == Phase::Reached && now.estimate > good.estimate);
+    assert_eq!(again.frame.unwrap().film, good.frame.unwrap().film);
+    // A scene that is not there, and back.
+    bench.wanted.settings = None;
+    bench.choose("no/such.glb", &[]);
+    let now = bench.wait("the error", |now| matches!(&now.phase, Phase::Failed(text) if text.contains("such.glb")));
+    assert!(now.opened.is_none() && now.frame.is_none());
+    bench.wanted.scene = None;
+    bench.send();
+    bench.wait_for(&Phase::Empty);
+}
+
+#[test]
+fn a_scene_that_is_left_is_freed() {
+    let mut bench = Bench::open("cornell", until(1));
+    let mut left: Vec<std::sync::Weak<PackedScene>> = vec![];
+    for i in 0..20 {
+        let name = ["cornell", "bathroom"][i % 2];
+        bench.choose(name, &["size=16x16", "photons=500", &format!("seed={i}")]);
+        let now = bench.wait(name, |now| {
+            let same = now.opened.as_ref().is_some_and(|opened| opened.source.settings.seed == Some(i as u32));
+            same && now.phase == Phase::Reached && now.painted.as_ref().is_some_and(|p| p.frame.film.n_iterations == 1)
+        });
+        left.push(Arc::downgrade(&now.frame.unwrap().scene));
+    }
+    bench.wanted.scene = None;
+    bench.send();
+    bench.wait_for(&Phase::Empty);
+    bench.wait("memory", |_| left.iter().all(|scene| scene.upgrade().is_none()));
+    assert_eq!(left.len(), 20);
+}
+
+#[test]
+fn a_lost_device_is_opened_again() {
+    let device = match crate::devices::open_backend("gpu") {
+        Ok(device) => device,
+        Err(error) => {
+            assert!(std::env::var_os("SUNFLECK_REQUIRE_GPU").is_none(), "SUNFLECK_REQUIRE_GPU is set, but: {error}");
+            return;
+        }
+    };
+    let Device::Gpu(context, _) = &device else { unreachable!("asked for a GPU") };
+    let context = Arc::clone(context);
+    let mut bench = Bench::open_on(device, "cornell", until(2));
+    let before = bench.wait_for_film(&Phase::Reached, 2);
+    context.destroy();
+    bench.wanted.limits = until(4);
+    bench.send();
+    let now = bench.wait("the loss", |now| matches!(now.phase, Phase::Failed(_)));
+    assert_eq!(iterations(&now), Some(2));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    assert!(matches!(bench.save(&path), Message::Said(_)));
+    assert_eq!(exr::read(&path).unwrap().rgb, before.frame.unwrap().film.rgb());
+    bench.wanted.retries += 1;
+    bench.send();
+    bench.wait_for_film(&Phase::Reached, 4);
+}
+
+#[test]
+fn a_panic_is_an_error() {
+    assert_eq!(catch(|| 3), Ok(3));
+    let text = catch(|| -> u32 { panic!("at {}\nof", 7) }).unwrap_err();
+    assert_eq!(text, "a bug in sunfleck: at 7 of");
+}

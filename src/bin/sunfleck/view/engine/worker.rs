@@ -1,0 +1,319 @@
+//! The render thread.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::thread::JoinHandle;
+
+use anyhow::{Context, Result};
+use sunfleck::output;
+use sunfleck::scene::settings::Settings;
+
+use super::session::{Frame, Session};
+use super::{Board, Choice, Message, Opened, Phase, Save, Shared, Wanted, catch};
+use crate::cli::{InputArgs, Usage};
+use crate::devices::Device;
+use crate::job;
+use crate::scenes::Source;
+
+/// What the render thread has of what is wanted.
+struct Have {
+    wanted: Wanted,
+    session: Option<Session>,
+    opened: Option<Arc<Opened>>,
+    estimate: u64,
+    steps_done: u32,
+    writers: Vec<JoinHandle<()>>,
+}
+
+/// Until the interface is gone.
+pub fn run(shared: &Arc<Shared>, mut device: Device) {
+    let mut have =
+        Have { wanted: Wanted::default(), session: None, opened: None, estimate: 0, steps_done: 0, writers: vec![] };
+    loop {
+        let (wanted, saves) = {
+            let mut board = shared.wait_until(|board| {
+                !board.saves.is_empty()
+                    || have.is_behind(&board.wanted)
+                    || have.can_go_on(&board.wanted, board.noise())
+                    || have.should_show(&board.wanted)
+                    || have.should_say(board)
+            });
+            if board.quit {
+                break;
+            }
+            (board.wanted.clone(), std::mem::take(&mut board.saves))
+        };
+        let done = catch(|| {
+            saves.into_iter().for_each(|save| have.save(shared, save));
+            have.follow(shared, &mut device, &wanted).map_err(|error| crate::one_line(&crate::chain(&error)))
+        });
+        if let Err(error) = done.flatten() {
+            have.fail(shared, error);
+        }
+    }
+    for writer in have.writers {
+        let _ = writer.join();
+    }
+}
+
+impl Board {
+    fn noise(&self) -> Option<f64> {
+        self.history.estimated.last().map(|measured| measured.rel_mse)
+    }
+}
+
+impl Have {
+    /// Whether what is wanted calls for more than going on.
+    fn is_behind(&self, wanted: &Wanted) -> bool {
+        (&self.wanted.scene, self.wanted.reloads) != (&wanted.scene, wanted.reloads)
+            || self.wanted.retries != wanted.retries
+            || self.is_stale(wanted)
+    }
+
+    /// Whether the estimate under way is not the one wanted.
+    fn is_stale(&self, wanted: &Wanted) -> bool {
+        self.opened.is_some()
+            && (self.wanted.moving != wanted.moving
+                || self.wanted.restarts != wanted.restarts
+                || self.rendered(&self.wanted) != self.rendered(wanted))
+    }
+
+    fn rendered(&self, wanted: &Wanted) -> Option<Settings> {
+        self.opened.as_ref().map(|opened| rendered(opened, wanted))
+    }
+
+    fn can_go_on(&self, wanted: &Wanted, noise: Option<f64>) -> bool {
+        let Some(session) = &self.session else { return false };
+        match wanted.paused {
+            true => self.steps_done < wanted.steps || session.n_iterations == 0,
+            false => !session.is_done(wanted, noise),
+        }
+    }
+
+    /// Whether there is nothing to do but to show what there is.
+    fn should_show(&self, wanted: &Wanted) -> bool {
+        self.session.as_ref().is_some_and(|session| session.owes(wanted.painting.looks_inside()))
+    }
+
+    /// Whether it rests without having said so: a limit was reached, or a pause asked for, after the last film was shown.
+    fn should_say(&self, board: &Board) -> bool {
+        self.session.is_some() && !self.can_go_on(&board.wanted, board.noise()) && board.phase != resting(&board.wanted)
+    }
+
+    /// Does one thing that leads towards what is wanted.
+    fn follow(&mut self, shared: &Shared, device: &mut Device, wanted: &Wanted) -> Result<()> {
+        let is_retry = self.wanted.retries != wanted.retries && self.session.is_none() && wanted.scene.is_some();
+        let is_other_scene = (&self.wanted.scene, self.wanted.reloads) != (&wanted.scene, wanted.reloads)
+            || is_retry && self.opened.is_none();
+        let is_stale = self.is_stale(wanted);
+        let before = std::mem::replace(&mut self.wanted, wanted.clone());
+        if is_retry && device.is_lost() {
+            *device = device.reopen()?;
+        }
+        if is_other_scene {
+            // The memory of the old one first.
+            (self.session, self.opened) = (None, None);
+            shared.update(|board| {
+                (board.opened, board.frame, board.painted) = (None, None, None);
+                board.phase = Phase::Loading;
+            });
+            let Some(choice) = &wanted.scene else {
+                shared.update(|board| board.phase = Phase::Empty);
+                return Ok(());
+            };
+            let opened = Arc::new(open(choice)?);
+            self.opened = Some(Arc::clone(&opened));
+            shared.update(|board| {
+                board.opened = Some(opened);
+            });
+            return self.prepare(shared, device, wanted);
+        }
+        if is_stale || is_retry {
+            return match self.rendered(&before) == self.rendered(wanted) && self.session.is_some() {
+                true => self.restart(shared, wanted),
+                false => self.prepare(shared, device, wanted),
+            };
+        }
+        let noise = shared.board().noise();
+        match self.can_go_on(wanted, noise) {
+            true => self.iterate(shared, wanted),
+            false => self.show(shared, wanted, true),
+        }
+    }
+
+    /// Applies the settings, as far as possible to the scene that the device has.
+    fn prepare(&mut self, shared: &Shared, device: &Device, wanted: &Wanted) -> Result<()> {
+        let Some(opened) = self.opened.clone() else { return Ok(()) };
+        let settings = wanted.settings.as_deref().unwrap_or(&opened.source.settings).clone();
+        let is_same_scene = |session: &Session| {
+            Arc::ptr_eq(&session.opened, &opened) && of_scene(&session.settings) == of_scene(&settings)
+        };
+        match self.session.as_mut().filter(|session| is_same_scene(session)) {
+            Some(session) => {
+                job::prepare_again(&mut session.input, &settings, &opened.loaded.scene)?;
+                session.settings = Arc::new(settings);
+            }
+            None => {
+                let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
+                shared.update(|board| board.phase = Phase::Preparing);
+                self.session = None; // Its memory first.
+                let warnings: Vec<_> = input.warnings.iter().cloned().map(Message::Warning).collect();
+                let session = Session::new(device, opened, Arc::new(settings), input)?;
+                shared.update(|board| {
+                    board.messages.extend(warnings);
+                    board.device = session.device();
+                });
+                self.session = Some(session);
+            }
+        }
+        self.restart(shared, wanted)
+    }
+
+    fn restart(&mut self, shared: &Shared, wanted: &Wanted) -> Result<()> {
+        let Some(session) = &mut self.session else { return Ok(()) };
+        self.estimate += 1;
+        self.steps_done = wanted.steps;
+        shared.update(|board| {
+            board.phase = Phase::Starting;
+            board.estimate = self.estimate;
+            board.history = Default::default();
+        });
+        session.restart(self.estimate, wanted.moving)?;
+        Ok(())
+    }
+
+    fn iterate(&mut self, shared: &Shared, wanted: &Wanted) -> Result<()> {
+        let Some(session) = &mut self.session else { return Ok(()) };
+        let opened = Arc::clone(&session.opened);
+        shared.enter(Phase::Rendering);
+        // The first picture of a preview is always shown, or a camera that keeps moving would show none.
+        let keep_on = wanted.moving && session.n_iterations == 0;
+        let is_stale = || {
+            let board = shared.board();
+            let now = &board.wanted;
+            board.quit
+                || (&wanted.scene, wanted.reloads) != (&now.scene, now.reloads)
+                || !keep_on
+                    && ((wanted.moving, wanted.restarts) != (now.moving, now.restarts)
+                        || rendered(&opened, wanted) != rendered(&opened, now))
+        };
+        let Some(record) = session.iterate(is_stale)? else { return Ok(()) };
+        if wanted.paused {
+            self.steps_done = (self.steps_done + 1).min(wanted.steps);
+        }
+        let noise = shared.board().noise();
+        shared.note(|board| board.history.records.push(record));
+        self.show(shared, wanted, !self.can_go_on(wanted, noise))
+    }
+
+    /// Publishes the film now and then; at once if it `is_last` for a while.
+    fn show(&mut self, shared: &Shared, wanted: &Wanted, is_last: bool) -> Result<()> {
+        let Some(session) = &mut self.session else { return Ok(()) };
+        let frame = session.frame_if_due(is_last, wanted.painting.looks_inside())?;
+        if let Some(frame) = frame {
+            shared.update(|board| board.frame = Some(Arc::new(frame)));
+        }
+        if is_last {
+            shared.enter(resting(wanted));
+        }
+        Ok(())
+    }
+
+    /// The film so far stays on view, and can be saved.
+    fn fail(&mut self, shared: &Shared, text: String) {
+        self.session = None;
+        shared.update(|board| {
+            board.messages.push(Message::Error(text.clone()));
+            board.phase = Phase::Failed(text);
+        });
+    }
+
+    /// On a thread of its own: files take their time.
+    fn save(&mut self, shared: &Arc<Shared>, save: Save) {
+        let newest = self.session.as_mut().filter(|session| session.n_iterations > 0).map(Session::frame);
+        let frame = match newest {
+            Some(Ok(frame)) => Some(Arc::new(frame)),
+            _ => shared.board().frame.clone(),
+        };
+        let (device, shared) = (shared.board().device.clone(), Arc::clone(shared));
+        self.writers.retain(|writer| !writer.is_finished());
+        self.writers.push(std::thread::spawn(move || {
+            let written = frame.context("there is no picture yet").and_then(|frame| write(&save, &frame, device));
+            let message = match written {
+                Ok(n) => Message::Said(format!("saved {} after {n} iterations", save.path.display())),
+                Err(error) => Message::Error(crate::one_line(&crate::chain(&error))),
+            };
+            shared.update(|board| board.messages.push(message));
+        }));
+    }
+}
+
+/// The phase of an estimate that does not go on.
+fn resting(wanted: &Wanted) -> Phase {
+    if wanted.paused { Phase::Paused } else { Phase::Reached }
+}
+
+/// Reads a scene and the settings that lie beside it.
+fn open(choice: &Choice) -> Result<Opened> {
+    let mut source = Source::resolve(&choice.name)?;
+    let read = source.settings.clone();
+    for pair in &choice.set {
+        source.settings.set(pair).map_err(|e| Usage(format!("--set {pair}: {e}")))?;
+    }
+    source.locate();
+    let loaded = source.scene()?;
+    Ok(Opened { source, read, loaded })
+}
+
+/// Those settings that the estimate depends on.
+fn rendered(opened: &Opened, wanted: &Wanted) -> Settings {
+    let settings = wanted.settings.as_deref().unwrap_or(&opened.source.settings);
+    Settings { exposure: None, iterations: None, seconds: None, ..settings.clone() }
+}
+
+/// Those settings that change the scene: not the camera, not the estimator's.
+fn of_scene(settings: &Settings) -> Settings {
+    Settings {
+        size: None,
+        photons: None,
+        alpha: None,
+        radius: None,
+        kernel: None,
+        direct: None,
+        iterations: None,
+        seconds: None,
+        seed: None,
+        exposure: None,
+        max_segments: None,
+        camera: None,
+        ..settings.clone()
+    }
+}
+
+fn write(save: &Save, frame: &Frame, adapter: String) -> Result<u32> {
+    let (film, params) = (&frame.film, &frame.params);
+    let picture = frame.picture();
+    if is_png(&save.path) {
+        output::png::write(&save.path, &picture, &save.look)?;
+    } else {
+        let header = output::exr::Header {
+            scene: frame.opened.source.name.clone(),
+            command: frame.opened.command(&frame.settings, film.n_iterations, &save.path),
+            adapter,
+            seed: params.seed,
+            alpha: params.alpha,
+            first_radius: frame.first_radius,
+            last_radius: frame.radius,
+            iterations: film.n_iterations,
+            photons_per_iteration: params.n_paths,
+            seconds: frame.seconds,
+            camera: frame.camera,
+        };
+        output::exr::write(&save.path, &picture, &header)?;
+    }
+    Ok(film.n_iterations)
+}
+
+fn is_png(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"))
+}

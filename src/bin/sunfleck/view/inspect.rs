@@ -1,0 +1,387 @@
+//! The panel on the right: what is shown, and the numbers behind it.
+
+use std::sync::Arc;
+
+use eframe::egui;
+use egui::{Color32, RichText};
+use glam::{Vec2, Vec3};
+use sunfleck::inspect::{self, ColorBy, Object};
+use sunfleck::output::difference::Measure;
+use sunfleck::output::display;
+use sunfleck::output::false_colour;
+use sunfleck::output::tonemap::srgb_encode;
+use sunfleck::ppm::film::luminance;
+
+use super::app::Viewer;
+use super::charts::{bar, bars, bounces, rgb, rgba, short};
+use super::engine::{Comparison, Legend, Painted, Values, View};
+use crate::progress::length;
+
+/// Of what there is nothing to say about.
+const NONE: &str = "–";
+
+/// Numbers over all of a picture, which are not counted anew in every frame of the window.
+#[derive(Default)]
+pub struct InspectView {
+    of: Option<Arc<Painted>>,
+    /// Metres; none if nothing gathers.
+    mean_radius: Option<f32>,
+    /// Powers of the photons, W before the division by the number of paths.
+    powers: Option<[f32; 2]>,
+}
+
+impl InspectView {
+    fn take(&mut self, painted: &Arc<Painted>) {
+        if self.of.as_ref().is_some_and(|of| Arc::ptr_eq(of, painted)) {
+            return;
+        }
+        let frame = &painted.frame;
+        let (mut sum, mut n) = (0.0, 0u32);
+        for radius in frame.first_radii.iter().filter(|r| **r > 0.0 && r.is_finite()) {
+            sum += f64::from(*radius);
+            n += 1;
+        }
+        self.mean_radius = (n > 0).then(|| (sum / f64::from(n)) as f32 * shrunk(painted));
+        let by_power = painted.painting.photons == Some(ColorBy::Power);
+        let insides = frame.insides.as_ref().filter(|_| by_power);
+        self.powers = insides.map(|insides| inspect::power_range(&insides.photons));
+        self.of = Some(Arc::clone(painted));
+    }
+}
+
+/// Radius of now over the first.
+fn shrunk(painted: &Painted) -> f32 {
+    painted.frame.radius / painted.frame.first_radius.max(f32::MIN_POSITIVE)
+}
+
+impl Viewer {
+    /// The view `by` places further in the list, round its ends.
+    pub fn next_view(&mut self, by: isize) {
+        let view = &mut self.wanted.painting.view;
+        let at = View::ALL.iter().position(|v| v == view).unwrap_or(0) as isize;
+        *view = View::ALL[(at + by).rem_euclid(View::ALL.len() as isize) as usize];
+    }
+
+    /// Photons over the picture: none, by power, by bounce.
+    pub fn next_photons(&mut self) {
+        let photons = &mut self.wanted.painting.photons;
+        *photons = match photons {
+            None => Some(ColorBy::Power),
+            Some(ColorBy::Power) => Some(ColorBy::Bounce),
+            Some(ColorBy::Bounce) => None,
+        };
+    }
+}
+
+pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
+    let painted = viewer.picture.painted().cloned();
+    if let Some(painted) = &painted {
+        viewer.inspect.take(painted);
+    }
+    let painted = painted.as_deref();
+    egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        section(ui, "View", |ui| view(ui, viewer, painted));
+        section(ui, "Under the cursor", |ui| cursor(ui, viewer, painted));
+        section(ui, "Whole picture", |ui| whole(ui, viewer, painted));
+        section(ui, "Compare", |ui| super::compare::section(ui, viewer));
+    });
+}
+
+fn section(ui: &mut egui::Ui, name: &str, content: impl FnOnce(&mut egui::Ui)) {
+    egui::CollapsingHeader::new(RichText::new(name).strong()).default_open(true).show_unindented(ui, content);
+}
+
+/// What is shown, how large, and what its colours mean.
+fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
+    let painting = &mut viewer.wanted.painting;
+    egui::Grid::new("view").num_columns(2).show(ui, |ui| {
+        let label = ui.label("Show");
+        let text = format!("{}. Does not restart the estimate. (V, Shift+V)", painting.view.describe());
+        egui::ComboBox::from_id_salt("view")
+            .selected_text(painting.view.name())
+            .height(400.0)
+            .show_ui(ui, |ui| {
+                for view in View::ALL {
+                    ui.selectable_value(&mut painting.view, view, view.name()).on_hover_text(view.describe());
+                }
+            })
+            .response
+            .on_hover_text(text)
+            .labelled_by(label.id);
+        ui.end_row();
+        let label = ui.label("Photons");
+        let name = |photons| match photons {
+            None => "off",
+            Some(ColorBy::Power) => "by power",
+            Some(ColorBy::Bounce) => "by bounce",
+        };
+        egui::ComboBox::from_id_salt("photons")
+            .selected_text(name(painting.photons))
+            .show_ui(ui, |ui| {
+                for photons in [None, Some(ColorBy::Power), Some(ColorBy::Bounce)] {
+                    ui.selectable_value(&mut painting.photons, photons, name(photons));
+                }
+            })
+            .response
+            .on_hover_text(
+                "Photons of the last iteration as points over the picture. Does not restart the estimate. (G)",
+            )
+            .labelled_by(label.id);
+        ui.end_row();
+        ui.label("Zoom");
+        ui.horizontal(|ui| {
+            let zoom = &mut viewer.picture.zoom;
+            for (value, name, text) in [
+                (None, "Fit", "The whole picture in the window (1)"),
+                (Some(1.0), "1:1", "One pixel to a point (2)"),
+                (Some(4.0), "4:1", "Four points to a pixel (3); Ctrl + wheel for more, until values appear"),
+            ] {
+                ui.selectable_value(zoom, value, name).on_hover_text(text);
+            }
+        });
+        ui.end_row();
+    });
+    let Some(painted) = painted else { return };
+    let waits = painted.painting.looks_inside() && painted.frame.insides.is_none();
+    if waits {
+        ui.weak("Waiting for an iteration's photons …");
+    } else if painted.painting.view == View::Variance && painted.frame.film.n_iterations < 2 {
+        ui.weak("One iteration has no variance yet.");
+    }
+    if let (true, Some(insides)) = (painted.painting.view.needs_photons(), &painted.frame.insides) {
+        let text = match (painted.painting.view, insides.split.n_iterations) {
+            (View::NodesVisited, _) => "Of the last iteration".to_owned(),
+            (_, 1) => "Of one iteration".to_owned(),
+            (_, n) => format!("Mean of {n} iterations"),
+        };
+        ui.weak(text).on_hover_text("Iterations are looked into while a view or photons that need it are on");
+    }
+    if let Some(legend) = &painted.legend {
+        let unit = unit(painted);
+        let map = |t: f32| match legend.signed {
+            true => signed_color(legend, t),
+            false => rgba(false_colour::colour(t)),
+        };
+        bar(ui, "Legend", legend.range, legend.log, unit, map);
+    }
+    if let (Some(color_by), Some(insides)) = (painted.painting.photons, &painted.frame.insides) {
+        match color_by {
+            ColorBy::Power => {
+                let per_path = 1.0 / painted.frame.params.n_paths.max(1) as f32;
+                let range = viewer.inspect.powers.unwrap_or([1.0; 2]).map(|power| power * per_path);
+                let map = |t| rgb(inspect::power_color(t));
+                bar(ui, "Power of a photon", range, true, "W a photon", map);
+            }
+            ColorBy::Bounce => bounces(ui),
+        }
+        ui.weak(format!("{} photons", insides.photons.len()));
+    }
+}
+
+/// At `t` of a signed legend, in [0, 1].
+fn signed_color(legend: &Legend, t: f32) -> Color32 {
+    let [low, high] = legend.range;
+    let mut bytes = vec![];
+    false_colour::signed(&[low + (high - low) * t], Some(high), &mut bytes);
+    rgb([bytes[0], bytes[1], bytes[2]])
+}
+
+/// Of the numbers that are shown as colours.
+fn unit(painted: &Painted) -> &'static str {
+    // Without a reference of its size the view is shown all the same.
+    if painted.mean.is_some() {
+        match painted.painting.comparison {
+            Comparison::Difference(Measure::Absolute | Measure::Signed) => return "W/(m² sr)",
+            Comparison::Difference(Measure::Squared) => return "(W/(m² sr))²",
+            Comparison::Difference(Measure::Relative | Measure::RelativeSquared) => return "relative",
+            Comparison::Flip => return "FLIP, 0 to 1",
+            Comparison::Off | Comparison::Wipe => {}
+        }
+    }
+    match painted.painting.view {
+        View::Stops => "stops about mid grey",
+        View::Depth | View::Radius => "m",
+        View::PhotonCount => "photons a pixel",
+        View::NodesVisited => "nodes a pixel",
+        View::Variance => "(W/(m² sr))²",
+        _ => "",
+    }
+}
+
+/// A line of a table; `text` says more.
+pub fn row(ui: &mut egui::Ui, name: &str, value: Option<String>, text: &str) {
+    ui.label(name).on_hover_text(text);
+    let value = value.unwrap_or_else(|| NONE.to_owned());
+    ui.add(egui::Label::new(RichText::new(value).monospace().size(11.0)).truncate()).on_hover_text(text);
+    ui.end_row();
+}
+
+pub fn table(ui: &mut egui::Ui, name: &str, rows: impl FnOnce(&mut egui::Ui)) {
+    egui::Grid::new(name).num_columns(2).min_row_height(15.0).min_col_width(80.0).spacing([8.0, 2.0]).show(ui, rows);
+}
+
+/// Of the pixel under the cursor.
+fn cursor(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
+    let at = painted.zip(viewer.picture.hovered);
+    let film = at.and_then(|(painted, [x, y])| {
+        let i = y * painted.size[0] + x;
+        let pixel = painted.frame.film.pixels.get(i).filter(|_| x < painted.size[0])?;
+        Some((painted, i, [pixel[0], pixel[1], pixel[2]], pixel[3]))
+    });
+    let three = |rgb: [f32; 3]| rgb.map(short).join(" ");
+    table(ui, "cursor", |ui| {
+        let pixel = at.map(|(painted, [x, y])| match painted.frame.is_preview {
+            true => format!("{x}, {y} of {}×{}", painted.size[0], painted.size[1]),
+            false => format!("{x}, {y}"),
+        });
+        row(ui, "Pixel", pixel, "Column and row from the upper left corner");
+        let radiance = film.map(|(_, _, rgb, _)| rgb);
+        row(ui, "Radiance", radiance.map(three), "Red, green, blue: linear, W/(m² sr)");
+        row(ui, "Luminance", radiance.map(|rgb| short(luminance(rgb))), "Weighted mean of the radiance");
+        let exposed = film.map(|(painted, _, rgb, _)| rgb.map(|c| c * painted.exposure.exp2()));
+        row(ui, "Exposed", exposed.map(three), "Radiance after exposure; 0.18 is mid grey");
+        let shown = film.map(|(painted, _, rgb, _)| on_display(rgb, painted));
+        row(
+            ui,
+            "Display",
+            shown.map(|rgb| rgb.map(|c| c.to_string()).join("  ")),
+            "After the tone curve: sRGB, 0 to 255",
+        );
+        let value = at.and_then(|(painted, [x, y])| match &painted.values {
+            Values::Scalar(_) => painted.value(x, y).first().map(|v| short(*v)),
+            Values::Rgb(_) if painted.painting.view == View::Picture => None,
+            Values::Rgb(_) => <[f32; 3]>::try_from(painted.value(x, y)).ok().map(three),
+        });
+        row(ui, "Shown", value, "What the view or the comparison shows here");
+    });
+    ui.separator();
+    let hit = at.and_then(|(painted, [x, y])| {
+        let centre = Vec2::new(x as f32, y as f32) + 0.5;
+        inspect::pick(&painted.frame.scene, &painted.frame.view(), centre)
+    });
+    table(ui, "hit", |ui| {
+        row(ui, "Depth", hit.map(|hit| length(hit.depth)), "Of what is seen first, along the view");
+        let vector = |v: Vec3| v.to_array().map(|c| format!("{c:.3}")).join(" ");
+        row(ui, "Position", hit.map(|hit| vector(hit.position)), "Of what is seen first: x, y, z, metres, world space");
+        row(ui, "Normal", hit.map(|hit| vector(hit.normal)), "For shading, on the camera's side, world space");
+        let names = hit.and_then(|hit| Some((hit, viewer.opened()?)));
+        let material = names.map(|(hit, opened)| material(&opened.loaded.scene, hit.material as usize));
+        row(ui, "Material", material, "Of what is seen first; a click selects it");
+        let object = names.map(|(hit, opened)| object(&opened.loaded.scene, hit.object(&opened.loaded.scene)));
+        row(ui, "Object", object, "What is seen first");
+    });
+    ui.separator();
+    table(ui, "photons", |ui| {
+        let insides = film.and_then(|(painted, i, ..)| Some((painted.frame.insides.as_ref()?, i)));
+        let gathered = insides.and_then(|(insides, i)| insides.split.pixels.get(i)).map(|parts| short(parts.gathered));
+        row(
+            ui,
+            "Photons",
+            gathered,
+            "Gathered by an iteration, on average; a view or photons that need them must be on",
+        );
+        let radius = film.and_then(|(painted, i, ..)| Some(painted.frame.first_radii.get(i)? * shrunk(painted)));
+        row(ui, "Radius", radius.map(length), "Of the estimate, now");
+        let variance = film.and_then(|(painted, _, _, m2)| variance(m2, painted.frame.film.n_iterations));
+        row(ui, "Variance", variance.map(short), "Of the mean luminance, estimated");
+        let error = variance.zip(radiance_of(film)).filter(|(_, y)| *y > 0.0).map(|(v, y)| v.sqrt() / y);
+        let error = error.map(|e| format!("{} %", short(100.0 * e)));
+        row(ui, "Relative error", error, "Standard deviation of the mean luminance over it");
+        let nodes = insides.and_then(|(insides, i)| insides.nodes_visited.get(i)).map(u32::to_string);
+        row(ui, "Nodes visited", nodes, "Of the tree, by this pixel's last search");
+    });
+    ui.separator();
+    selection(ui, viewer);
+}
+
+type OnFilm<'a> = (&'a Painted, usize, [f32; 3], f32);
+
+fn radiance_of(film: Option<OnFilm>) -> Option<f32> {
+    film.map(|(_, _, rgb, _)| luminance(rgb))
+}
+
+/// Of a pixel's mean, from the sum of the squares of the deviations; none before two iterations.
+fn variance(m2: f32, n_iterations: u32) -> Option<f32> {
+    let n = n_iterations as f32;
+    (n_iterations >= 2).then(|| m2.max(0.0) / (n * (n - 1.0)))
+}
+
+/// sRGB without the dither.
+fn on_display(rgb: [f32; 3], painted: &Painted) -> [u8; 3] {
+    let shown = display::linear(&[rgb], painted.exposure, painted.painting.look.tonemap);
+    shown.first().map_or([0; 3], |rgb| rgb.map(|c| (255.0 * srgb_encode(c) + 0.5) as u8))
+}
+
+fn material(scene: &sunfleck::scene::Scene, index: usize) -> String {
+    match scene.materials.get(index) {
+        Some(material) if !material.name.is_empty() => material.name.clone(),
+        Some(_) => format!("material {index}"),
+        None => "of the settings".to_owned(),
+    }
+}
+
+fn object(scene: &sunfleck::scene::Scene, object: Object) -> String {
+    match object {
+        Object::Mesh(i) => match scene.meshes.get(i).map(|mesh| mesh.name.as_str()) {
+            Some("") | None => format!("mesh {i}"),
+            Some(name) => name.to_owned(),
+        },
+        Object::Sphere(i) => format!("sphere {i}"),
+    }
+}
+
+/// What a click selected.
+fn selection(ui: &mut egui::Ui, viewer: &mut Viewer) {
+    let name = viewer.opened().zip(viewer.selected).map(|(opened, index)| material(&opened.loaded.scene, index));
+    match name {
+        None => {
+            ui.weak("Click on the picture to select")
+                .on_hover_text("A double click puts it in focus, to turn about it");
+        }
+        Some(name) => {
+            ui.horizontal(|ui| {
+                if ui.small_button("Deselect").on_hover_text("Escape").clicked() {
+                    viewer.selected = None;
+                }
+                ui.add(egui::Label::new(format!("Selected: {name}")).truncate());
+            });
+        }
+    }
+}
+
+/// Of all pixels and photons.
+fn whole(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
+    table(ui, "whole", |ui| {
+        let last = viewer.engine().history(|history| history.records.last().copied());
+        let count = |n: u32| n.to_string();
+        row(ui, "Photons", last.map(|l| count(l.n_photons)), "Stored in the last iteration");
+        row(ui, "Paths", last.map(|l| count(l.n_paths)), "Photon paths of an iteration");
+        let each =
+            last.filter(|l| l.n_paths > 0).map(|l| format!("{:.3}", f64::from(l.n_photons) / f64::from(l.n_paths)));
+        row(ui, "Photons a path", each, "Stored, on average");
+        row(ui, "Mean radius", viewer.inspect.mean_radius.map(length), "Of the pixels' estimates, now");
+    });
+    if let Some(painted) = painted {
+        ui.add_space(4.0);
+        bars(ui, &painted.histogram);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_signed_legend_goes_from_red_to_green() {
+        let legend = Legend { range: [-0.3, 0.3], log: false, signed: true };
+        assert_eq!(signed_color(&legend, 0.0), Color32::from_rgb(255, 0, 0));
+        assert_eq!(signed_color(&legend, 0.5), Color32::BLACK);
+        assert_eq!(signed_color(&legend, 1.0), Color32::from_rgb(0, 255, 0));
+    }
+
+    #[test]
+    fn a_mean_has_a_variance_from_two_iterations_on() {
+        assert_eq!(variance(6.0, 1), None);
+        assert_eq!(variance(6.0, 3), Some(1.0));
+    }
+}

@@ -1,0 +1,101 @@
+//! Keyboard shortcuts: one table, from which the help is made.
+
+use eframe::egui;
+use egui::{Key, KeyboardShortcut, Modifiers};
+use sunfleck::ppm::Params;
+use sunfleck::scene::settings::Count;
+
+use super::app::Viewer;
+use super::files;
+
+/// What a shortcut does.
+type Action = fn(&mut egui::Ui, &mut Viewer);
+
+/// A line of the help.
+pub struct Shortcut {
+    pub keys: KeyboardShortcut,
+    pub what: &'static str,
+    action: Action,
+}
+
+const fn key(key: Key, what: &'static str, action: Action) -> Shortcut {
+    Shortcut { keys: KeyboardShortcut::new(Modifiers::NONE, key), what, action }
+}
+
+const fn shift(key: Key, what: &'static str, action: Action) -> Shortcut {
+    Shortcut { keys: KeyboardShortcut::new(Modifiers::SHIFT, key), what, action }
+}
+
+const fn command(key: Key, what: &'static str, action: Action) -> Shortcut {
+    Shortcut { keys: KeyboardShortcut::new(Modifiers::COMMAND, key), what, action }
+}
+
+const fn command_shift(key: Key, what: &'static str, action: Action) -> Shortcut {
+    Shortcut { keys: KeyboardShortcut::new(Modifiers::COMMAND.plus(Modifiers::SHIFT), key), what, action }
+}
+
+/// Those with more modifiers first: a shortcut also fires when further modifiers are held.
+pub const SHORTCUTS: &[Shortcut] = &[
+    command_shift(Key::S, "save the picture under another name", |_, v| files::save_as(v)),
+    command_shift(Key::C, "copy the command that renders this picture", |ui, v| files::copy_command(ui, v)),
+    command_shift(Key::Z, "redo", |_, v| v.redo()),
+    command(Key::O, "open a scene", |_, v| files::open(v)),
+    command(Key::S, "save the picture", |_, v| files::save(v)),
+    command(Key::R, "read the scene again", |_, v| v.reload()),
+    command(Key::W, "close the scene", |_, v| v.close_scene()),
+    command(Key::Q, "quit", |ui, _| ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close)),
+    command(Key::Z, "undo", |_, v| v.undo()),
+    command(Key::Y, "redo", |_, v| v.redo()),
+    shift(Key::E, "half a stop darker", |_, v| v.expose(-0.5)),
+    shift(Key::V, "view before", |_, v| v.next_view(-1)),
+    key(Key::V, "next view", |_, v| v.next_view(1)),
+    key(Key::G, "photons over the picture: by power, by bounce, none", |_, v| v.next_photons()),
+    key(Key::E, "half a stop brighter", |_, v| v.expose(0.5)),
+    key(Key::X, "automatic exposure", |_, v| v.wanted.painting.look.exposure = None),
+    key(Key::T, "next tone curve", |_, v| v.next_tone()),
+    key(Key::C, "next comparison with the reference", |_, v| v.next_comparison()),
+    key(Key::Space, "restart", |_, v| v.restart()),
+    key(Key::P, "pause, go on", |_, v| v.wanted.paused = !v.wanted.paused),
+    key(Key::N, "one iteration, then pause", |_, v| v.step()),
+    key(Key::Plus, "twice the photons an iteration", |ui, v| scale_photons(ui, v, 2.0)),
+    key(Key::Minus, "half the photons an iteration", |ui, v| scale_photons(ui, v, 0.5)),
+    key(Key::F, "frame all", |ui, v| v.frame_all(ui.input(|i| i.time))),
+    key(Key::Num1, "picture as large as the window", |_, v| v.picture.fit()),
+    key(Key::Num2, "one pixel to a point", |_, v| v.picture.zoom = Some(1.0)),
+    key(Key::Num3, "four points to a pixel", |_, v| v.picture.zoom = Some(4.0)),
+    key(Key::F1, "settings, shown or hidden", |_, v| v.remembered.show_settings ^= true),
+    key(Key::F2, "inspection, shown or hidden", |_, v| v.remembered.show_inspect ^= true),
+    key(Key::F3, "convergence, shown or hidden", |_, v| v.remembered.show_convergence ^= true),
+    key(Key::F12, "save a picture of the window", |ui, v| files::screenshot(ui, v)),
+    key(Key::Questionmark, "this help", |_, v| v.show_help ^= true),
+    key(Key::Escape, "close the help, select nothing", |_, v| {
+        v.show_help = false;
+        v.selected = None;
+    }),
+];
+
+fn scale_photons(ui: &egui::Ui, viewer: &mut Viewer, factor: f64) {
+    viewer.edit(ui, "photons", |settings| {
+        let now = settings.photons.map_or(Params::new(1, 1).n_paths, |n| n.0);
+        settings.photons = Some(Count((factor * f64::from(now)).max(1.0) as u32));
+    });
+}
+
+/// Does what was asked for by keys, unless they are typed into a field.
+pub fn handle(ui: &mut egui::Ui, viewer: &mut Viewer) {
+    let flying = ui.input(|i| i.pointer.secondary_down()) || viewer.picture.flying;
+    if ui.ctx().egui_wants_keyboard_input() || flying {
+        return;
+    }
+    for shortcut in SHORTCUTS {
+        // A question mark needs Shift on most keyboards.
+        let keys = shortcut.keys;
+        let pressed = match keys.logical_key {
+            Key::Questionmark => ui.input(|i| i.key_pressed(Key::Questionmark)),
+            _ => ui.input_mut(|i| i.consume_shortcut(&keys)),
+        };
+        if pressed {
+            (shortcut.action)(ui, viewer);
+        }
+    }
+}

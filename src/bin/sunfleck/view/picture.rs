@@ -1,0 +1,359 @@
+//! The picture in the middle: shown, zoomed into, and turned by hand.
+
+use std::sync::Arc;
+
+use eframe::egui;
+use egui::{Key, PointerButton, Rect, Vec2, pos2, vec2};
+use glam::Vec3;
+use sunfleck::inspect;
+use sunfleck::scene::settings::{CameraSettings, Settings};
+
+use super::app::Viewer;
+use super::camera::{Pace, Rig};
+use super::engine::{Painted, Phase};
+
+/// Radians an orbit turns over the picture's height.
+const ORBIT: f32 = 3.0;
+/// The same for looking about.
+const LOOK: f32 = 1.2;
+/// Steps of approach a notch of the wheel makes.
+const WHEEL: f32 = 1.0 / 50.0;
+/// Seconds after the last motion at which the camera counts as resting.
+const REST: f64 = 0.15;
+/// Points a pixel, from which on its value is written into it.
+const VALUES_FROM: f32 = 56.0;
+/// Points a pixel, at most.
+const MOST_ZOOM: f32 = 128.0;
+
+/// How the picture is shown, and the camera that is moved in it.
+#[derive(Default)]
+pub struct PictureView {
+    texture: Option<egui::TextureHandle>,
+    painted: Option<Arc<Painted>>,
+    /// Points a pixel; fitting the window if none.
+    pub zoom: Option<f32>,
+    /// From the window's middle to the picture's, points.
+    offset: Vec2,
+    rig: Option<(Arc<Settings>, Rig)>,
+    /// When the camera last moved.
+    moved: Option<f64>,
+    /// Whether keys move the camera.
+    pub flying: bool,
+    /// Pixel under the cursor.
+    pub hovered: Option<[usize; 2]>,
+    /// Where the picture is, points.
+    pub rect: Option<Rect>,
+    /// The room that there is for it, points.
+    pub area: Option<Rect>,
+}
+
+impl PictureView {
+    /// What is on the screen.
+    pub fn painted(&self) -> Option<&Arc<Painted>> {
+        self.painted.as_ref()
+    }
+
+    /// The whole picture in the window.
+    pub fn fit(&mut self) {
+        (self.zoom, self.offset) = (None, Vec2::ZERO);
+    }
+
+    /// Something moves, at `time`, seconds: previews until it rests.
+    pub fn move_on(&mut self, time: f64) {
+        self.moved = Some(time);
+    }
+
+    /// The picture of a scene that goes: it would keep the scene in memory.
+    pub fn forget(&mut self) {
+        (self.texture, self.painted, self.hovered) = (None, None, None);
+    }
+
+    fn take(&mut self, ctx: &egui::Context, painted: &Arc<Painted>) {
+        if self.painted.as_ref().is_some_and(|now| Arc::ptr_eq(now, painted)) {
+            return;
+        }
+        let (size, rgba) = painted.texture();
+        let image = egui::ColorImage::from_rgba_unmultiplied(size, rgba);
+        let options = egui::TextureOptions {
+            magnification: egui::TextureFilter::Nearest,
+            minification: egui::TextureFilter::Linear,
+            ..Default::default()
+        };
+        match &mut self.texture {
+            Some(texture) => texture.set(image, options),
+            None => self.texture = Some(ctx.load_texture("picture", image, options)),
+        }
+        self.painted = Some(Arc::clone(painted));
+    }
+}
+
+/// The picture, in all of the room there is.
+pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
+    let (area, response) = ui.allocate_exact_size(ui.available_size(), egui::Sense::click_and_drag());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Picture"));
+    ui.painter().rect_filled(area, 0.0, egui::Color32::from_gray(24));
+    viewer.picture.area = Some(area);
+    if let Some(painted) = viewer.now.painted.clone() {
+        viewer.picture.take(ui.ctx(), &painted);
+    }
+    move_camera(ui, viewer, area, &response);
+    super::failure::show(ui, viewer, area);
+    let Some(painted) = viewer.picture.painted.clone() else {
+        waiting(ui, viewer, area);
+        return;
+    };
+    // A preview fills the place of the picture it stands for.
+    let size = painted.frame.as_ref().params.size;
+    let full = if painted.frame.is_preview { viewer.full_size().unwrap_or(size) } else { size };
+    let full = vec2(full[0] as f32, full[1] as f32);
+    let rect = place(ui, viewer, area, full, &response);
+    viewer.picture.rect = Some(rect);
+    let painter = ui.painter_at(area);
+    if let Some(texture) = &viewer.picture.texture {
+        let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+        painter.image(texture.id(), rect, uv, egui::Color32::WHITE);
+    }
+    super::compare::overlay(ui, viewer, &painter, rect);
+    // Beside the reference's line too, which takes the pointer for itself.
+    let pointer = ui.input(|i| i.pointer.latest_pos()).filter(|p| response.contains_pointer() && area.contains(*p));
+    let at = pointer.and_then(|p| on_film(rect, painted.size, p));
+    let hovered = at.map(|at| [at.x as usize, at.y as usize]);
+    if viewer.picture.hovered != hovered {
+        viewer.picture.hovered = hovered;
+        // The panel that tells of it was drawn before.
+        ui.ctx().request_repaint();
+    }
+    click(ui, viewer, &response, rect, &painted);
+    if rect.width() / painted.size[0] as f32 >= VALUES_FROM {
+        values(&painter, area, rect, &painted);
+    }
+    if matches!(viewer.now.phase, Phase::Loading | Phase::Preparing) {
+        waiting(ui, viewer, area);
+    }
+}
+
+/// A place on the screen in film coordinates; none beside the picture.
+fn on_film(rect: Rect, size: [usize; 2], point: egui::Pos2) -> Option<glam::Vec2> {
+    let [width, height] = size.map(|n| n as f32);
+    let at = (point - rect.min) * vec2(width, height) / rect.size();
+    let inside = at.x >= 0.0 && at.y >= 0.0 && at.x < width && at.y < height;
+    inside.then(|| glam::vec2(at.x, at.y))
+}
+
+/// Selects what is clicked on; a double click also turns to it.
+fn click(ui: &egui::Ui, viewer: &mut Viewer, response: &egui::Response, rect: Rect, painted: &Painted) {
+    if !response.clicked_by(PointerButton::Primary) {
+        return;
+    }
+    let Some(point) = response.interact_pointer_pos() else { return };
+    let frame = &painted.frame;
+    let hit = on_film(rect, painted.size, point).and_then(|at| inspect::pick(&frame.scene, &frame.view(), at));
+    let n_materials = viewer.opened().map_or(0, |opened| opened.loaded.scene.materials.len());
+    viewer.selected = hit.map(|hit| hit.material as usize).filter(|&index| index < n_materials);
+    if let (true, Some(hit)) = (response.double_clicked_by(PointerButton::Primary), hit) {
+        viewer.move_rig(ui.input(|i| i.time), &mut |rig| {
+            rig.set_pivot(hit.position);
+            rig.focus_on(hit.position);
+        });
+    }
+}
+
+/// What is being waited for.
+fn waiting(ui: &egui::Ui, viewer: &Viewer, area: Rect) {
+    let text = match &viewer.now.phase {
+        Phase::Loading => "Reading the scene …".to_owned(),
+        Phase::Preparing => "Preparing the scene …".to_owned(),
+        Phase::Starting => "First photons …".to_owned(),
+        Phase::Rendering => "First iteration …".to_owned(),
+        _ => return,
+    };
+    let color = egui::Color32::from_gray(220);
+    let font = egui::FontId::proportional(16.0);
+    let galley = ui.painter().layout(text, font, color, (area.width() - 48.0).max(50.0));
+    let rect = Rect::from_center_size(area.center(), galley.size());
+    ui.painter().rect_filled(rect.expand(10.0), 6.0, egui::Color32::from_black_alpha(190));
+    ui.painter().galley(rect.min, galley, color);
+}
+
+/// Zooms and shifts; where the picture is.
+fn place(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, size: Vec2, response: &egui::Response) -> Rect {
+    let view = &mut viewer.picture;
+    let fitting = (area.size() / size).min_elem();
+    let rect_at = |zoom: f32, offset: Vec2| Rect::from_center_size(area.center() + offset, size * zoom);
+    // Ctrl and the wheel, or two fingers.
+    let factor = if response.hovered() { ui.input(egui::InputState::zoom_delta) } else { 1.0 };
+    if factor != 1.0
+        && let Some(cursor) = response.hover_pos()
+    {
+        let before = view.zoom.unwrap_or(fitting);
+        let after = (before * factor).clamp(fitting.min(1.0), MOST_ZOOM);
+        // What is under the cursor stays there.
+        let from_cursor = rect_at(before, view.offset).center() - cursor;
+        view.offset = cursor + from_cursor * (after / before) - area.center();
+        view.zoom = (after > fitting).then_some(after);
+    }
+    if view.zoom.is_none() {
+        view.offset = Vec2::ZERO;
+    }
+    if response.dragged_by(PointerButton::Primary) && ui.input(|i| i.modifiers.command) && view.zoom.is_some() {
+        view.offset += response.drag_delta();
+    }
+    rect_at(view.zoom.unwrap_or(fitting), view.offset)
+}
+
+/// Numbers in pixels large enough.
+fn values(painter: &egui::Painter, area: Rect, rect: Rect, painted: &Painted) {
+    let side = rect.width() / painted.size[0] as f32;
+    let visible = area.intersect(rect);
+    let range = |min: f32, max: f32, n: usize| (min / side).max(0.0) as usize..((max / side).ceil() as usize).min(n);
+    for y in range(visible.min.y - rect.min.y, visible.max.y - rect.min.y, painted.size[1]) {
+        for x in range(visible.min.x - rect.min.x, visible.max.x - rect.min.x, painted.size[0]) {
+            let i = y * painted.size[0] + x;
+            let corner = rect.min + vec2(x as f32, y as f32) * side;
+            let shade = painted.rgba[4 * i..4 * i + 3].iter().map(|&c| u32::from(c)).sum::<u32>();
+            let color = if shade > 384 { egui::Color32::BLACK } else { egui::Color32::WHITE };
+            let lines: Vec<String> = painted.value(x, y).iter().map(|v| format!("{v:.3}")).collect();
+            painter.text(
+                corner + Vec2::splat(0.5 * side),
+                egui::Align2::CENTER_CENTER,
+                lines.join("\n"),
+                egui::FontId::monospace((side / 5.5).min(14.0)),
+                color,
+            );
+        }
+    }
+}
+
+/// Mouse and keys on the camera.
+fn move_camera(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, response: &egui::Response) {
+    let time = ui.input(|i| i.time);
+    if viewer.rig().is_none() {
+        return;
+    }
+    let height = area.height().max(1.0);
+    let drag = response.drag_delta() / height;
+    let (shift, command) = ui.input(|i| (i.modifiers.shift, i.modifiers.command));
+    let mut moves = false;
+    let mut act = |viewer: &mut Viewer, change: &mut dyn FnMut(&mut Rig)| {
+        viewer.move_rig(time, change);
+        moves = true;
+    };
+    if drag != Vec2::ZERO && !command {
+        let is_pan = response.dragged_by(PointerButton::Middle) || shift && response.dragged_by(PointerButton::Primary);
+        if is_pan {
+            act(viewer, &mut |rig| rig.pan(glam::vec2(drag.x, drag.y)));
+        } else if response.dragged_by(PointerButton::Primary) {
+            act(viewer, &mut |rig| rig.orbit(-ORBIT * drag.x, ORBIT * drag.y));
+        } else if response.dragged_by(PointerButton::Secondary) {
+            act(viewer, &mut |rig| rig.look(LOOK * drag.x, -LOOK * drag.y));
+        }
+    }
+    if response.hovered() && !command {
+        let wheel = ui.input(|i| i.smooth_scroll_delta().y);
+        if wheel != 0.0 {
+            let cursor = response.hover_pos().map(|p| (p - area.center()) / height).map(|p| glam::vec2(p.x, p.y));
+            act(viewer, &mut |rig| rig.zoom(wheel * WHEEL, cursor));
+        }
+    }
+    let typing = ui.ctx().egui_wants_keyboard_input();
+    let was_flying = viewer.picture.flying;
+    let direction = if typing { Vec3::ZERO } else { ui.input(|i| flight(i, was_flying)) };
+    viewer.picture.flying = direction != Vec3::ZERO;
+    if direction != Vec3::ZERO {
+        let (pace, seconds) = ui.input(|i| {
+            let pace = if i.modifiers.shift {
+                Pace::Fast
+            } else if i.modifiers.ctrl {
+                Pace::Slow
+            } else {
+                Pace::Normal
+            };
+            (pace, i.stable_dt)
+        });
+        act(viewer, &mut |rig| rig.fly(direction.normalize(), pace, seconds));
+    }
+    let view = &mut viewer.picture;
+    if moves {
+        view.moved = Some(time);
+    }
+    let rests = view.moved.is_none_or(|moved| time - moved > REST) && direction == Vec3::ZERO;
+    viewer.wanted.moving = !rests;
+    if !rests {
+        // Again soon, to see that it rests.
+        ui.ctx().request_repaint_after_secs(0.03);
+    }
+}
+
+/// x to the right, y up, z forward. Keys with Ctrl are shortcuts, and E alone is one, unless the camera flies already.
+fn flight(input: &egui::InputState, flying: bool) -> Vec3 {
+    let axis = |plus: Key, minus: Key| f32::from(input.key_down(plus)) - f32::from(input.key_down(minus));
+    let level = Vec3::new(axis(Key::D, Key::A), 0.0, axis(Key::W, Key::S));
+    let looking = input.pointer.secondary_down();
+    if input.modifiers.alt || input.modifiers.command && !(flying || looking) {
+        return Vec3::ZERO;
+    }
+    let rises = flying || looking || level != Vec3::ZERO;
+    level + if rises { axis(Key::E, Key::Q) * Vec3::Y } else { Vec3::ZERO }
+}
+
+impl Viewer {
+    /// The camera that is moved: that of the settings.
+    pub fn rig(&mut self) -> Option<&mut Rig> {
+        let settings = Arc::clone(self.edits.now());
+        let known = self.picture.rig.as_ref().is_some_and(|(of, _)| Arc::ptr_eq(of, &settings));
+        if !known {
+            let (camera, bounds) = (self.camera()?, self.opened()?.bounds());
+            let pivot = self
+                .picture
+                .rig
+                .take()
+                .map(|(_, rig)| rig)
+                .filter(|rig| rig.position() == Vec3::from(camera.world_from_camera.translation))
+                .map(|rig| rig.pivot());
+            let mut rig = Rig::new(&camera, bounds);
+            // A lens or a colour was changed, not the place.
+            if let Some(pivot) = pivot {
+                rig.set_pivot(pivot);
+            }
+            self.picture.rig = Some((settings, rig));
+        }
+        self.picture.rig.as_mut().map(|(_, rig)| rig)
+    }
+
+    /// Moves the camera, and with it the settings.
+    pub fn move_rig(&mut self, time: f64, change: &mut dyn FnMut(&mut Rig)) {
+        let Some(rig) = self.rig() else { return };
+        change(rig);
+        let camera = CameraSettings::from(rig.camera());
+        self.edit_at(time, "camera", |settings| settings.camera = Some(camera));
+        if let Some((of, _)) = &mut self.picture.rig {
+            *of = Arc::clone(self.edits.now());
+        }
+        self.picture.move_on(time);
+    }
+
+    /// Of the picture that is wanted, pixels.
+    pub fn full_size(&self) -> Option<[u32; 2]> {
+        Some(crate::job::size(self.edits.now(), &self.camera()?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_film_is_where_the_picture_is() {
+        let rect = Rect::from_min_size(pos2(100.0, 50.0), vec2(400.0, 200.0));
+        for size in [[400, 200], [100, 50], [1, 1]] {
+            let [width, height] = size.map(|n| n as f32);
+            let middle = on_film(rect, size, rect.center()).unwrap();
+            assert_eq!(middle, glam::vec2(0.5 * width, 0.5 * height));
+            assert_eq!(on_film(rect, size, rect.min), Some(glam::Vec2::ZERO));
+            for outside in [rect.max, pos2(99.0, 100.0), pos2(300.0, 49.9), pos2(300.0, 250.0)] {
+                assert_eq!(on_film(rect, size, outside), None);
+            }
+        }
+        assert_eq!(on_film(Rect::NOTHING, [4, 4], pos2(1.0, 1.0)), None);
+    }
+}

@@ -1,0 +1,205 @@
+//! The camera: which one, where it stands, its lens.
+
+use eframe::egui;
+use egui::{DragValue, Ui};
+use sunfleck::scene::settings::{CameraSettings, Settings};
+use sunfleck::scene::{Camera, Projection, Scene};
+
+use super::widgets::{Name, metres, row, slider};
+use crate::view::app::Viewer;
+use crate::view::engine::Message;
+
+const CAMERA: Name = Name { name: "Camera", hint: "One of the scene's cameras. Restarts the estimate." };
+const POSITION: Name = Name { name: "Position", hint: "x, y and z; y is up, metres. Restarts the estimate." };
+const VIEW: Name =
+    Name { name: "Field of view", hint: "Full vertical angle of the view, degrees. Restarts the estimate." };
+const HEIGHT: Name = Name { name: "View height", hint: "Half the height of the view, metres. Restarts the estimate." };
+const APERTURE: Name = Name {
+    name: "Aperture",
+    hint: "Radius of the lens, metres: larger, and what is out of focus blurs more; 0 is a pinhole. Restarts the \
+           estimate.",
+};
+const FOCUS: Name = Name {
+    name: "Focus",
+    hint: "Distance of the plane in focus, metres; seen only with an aperture above 0. Restarts the estimate.",
+};
+
+pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
+    let Some(opened) = viewer.opened().cloned() else { return };
+    let Some(camera) = viewer.rig().map(|rig| rig.camera().clone()) else {
+        let hint = "The settings name a camera that the scene does not have.";
+        ui.colored_label(ui.visuals().warn_fg_color, "No such camera").on_hover_text(hint);
+        return;
+    };
+    which(ui, viewer, read, &opened.loaded.scene);
+    place(ui, viewer, &camera);
+    lens(ui, viewer, &camera);
+    ui.horizontal_wrapped(|ui| {
+        let hint = "Moves the camera until the whole scene is in the picture (F). Restarts the estimate.";
+        if ui.button("Frame all").on_hover_text(hint).clicked() {
+            viewer.frame_all(ui.input(|i| i.time));
+        }
+        let hint = "The camera as --set flags for `sunfleck render`, to the clipboard";
+        if ui.button("Copy camera as flags").on_hover_text(hint).clicked() {
+            let flags = flags(&viewer.settings(), read);
+            let text = if flags.is_empty() { "the camera is the file's: no flags" } else { "copied the camera" };
+            if !flags.is_empty() {
+                ui.ctx().copy_text(flags);
+            }
+            viewer.say(ui, Message::Said(text.to_owned()));
+        }
+    });
+}
+
+/// What turns the file's camera into this one, on the command line.
+fn flags(now: &Settings, read: &Settings) -> String {
+    let only = |settings: &Settings| Settings { camera: settings.camera.clone(), ..Settings::default() };
+    let pairs = only(now).difference(&only(read));
+    let flags: Vec<_> = pairs.iter().map(|pair| format!("--set {}", crate::render::quote(pair))).collect();
+    flags.join(" ")
+}
+
+/// One of the scene's cameras as settings say it: by name where that means only this one.
+fn chosen(scene: &Scene, index: usize) -> CameraSettings {
+    let camera = &scene.cameras[index];
+    let first = scene.cameras.iter().position(|other| other.name == camera.name);
+    match first == Some(index) && !camera.name.is_empty() {
+        true => CameraSettings { name: Some(camera.name.clone()), ..CameraSettings::default() },
+        false => camera.into(),
+    }
+}
+
+/// What to call it.
+fn title(camera: &Camera, index: usize) -> String {
+    if camera.name.is_empty() { format!("camera {index}") } else { camera.name.clone() }
+}
+
+fn which(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene) {
+    let now = viewer.settings();
+    let is_the_files = now.camera == read.camera;
+    let current = match &now.camera {
+        None => Some(0),
+        Some(camera) => (0..scene.cameras.len()).find(|&i| chosen(scene, i) == *camera),
+    };
+    let text = match current {
+        Some(i) => scene.cameras.get(i).map_or("framing the scene".to_owned(), |camera| title(camera, i)),
+        None if is_the_files => "the settings file's".to_owned(),
+        None => "moved by hand".to_owned(),
+    };
+    let mut picked = None;
+    let reset = row(ui, CAMERA, !is_the_files, |ui| {
+        let combo = egui::ComboBox::from_id_salt("camera").width(ui.available_width()).selected_text(text).truncate();
+        let inside = combo.show_ui(ui, |ui| {
+            for (i, camera) in scene.cameras.iter().enumerate() {
+                if ui.selectable_label(current == Some(i), title(camera, i)).clicked() {
+                    picked = Some(i);
+                }
+            }
+            if scene.cameras.is_empty() {
+                ui.label("The scene has none.");
+            }
+        });
+        inside.response
+    });
+    if let Some(i) = picked {
+        let camera = chosen(scene, i);
+        viewer.edits.end_step();
+        viewer.edit(ui, "which camera", |s| s.camera = Some(camera));
+    }
+    if reset {
+        viewer.reset(ui, |s| s.camera = read.camera.clone());
+    }
+}
+
+fn place(ui: &mut Ui, viewer: &mut Viewer, camera: &Camera) {
+    let mut settings = CameraSettings::from(camera);
+    let mut position = settings.position.unwrap_or_default();
+    let mut changed = false;
+    row(ui, POSITION, false, |ui| {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        let each = egui::vec2(((ui.available_width() - 4.0) / 3.0).max(20.0), ui.spacing().interact_size.y);
+        let speed = f64::from(camera.focus_distance.abs()).clamp(1e-3, 1e3) * 0.005;
+        let mut drag = |value: &mut f32| {
+            let drag = DragValue::new(value).speed(speed).range(-1e9..=1e9).update_while_editing(false);
+            ui.add_sized(each, drag.max_decimals(2))
+        };
+        let [x, y, z] = &mut position;
+        let response = drag(x) | drag(y) | drag(z);
+        changed = response.changed();
+        response
+    });
+    if changed {
+        settings.position = Some(position);
+        viewer.edit(ui, "camera", |s| s.camera = Some(settings));
+    }
+}
+
+fn lens(ui: &mut Ui, viewer: &mut Viewer, camera: &Camera) {
+    let time = ui.input(|i| i.time);
+    match camera.projection {
+        Projection::Perspective { yfov } => {
+            let mut degrees = f64::from(yfov.to_degrees());
+            row(ui, VIEW, false, |ui| {
+                let response = slider(ui, &mut degrees, 5.0..=140.0, |slider| slider.max_decimals(1).suffix("°"));
+                if response.changed() {
+                    viewer.move_rig(time, &mut |rig| rig.set_yfov((degrees as f32).to_radians()));
+                }
+                response
+            });
+        }
+        Projection::Orthographic { mut ymag } => {
+            row(ui, HEIGHT, false, |ui| {
+                let response = metres(ui, &mut ymag, 1e-6);
+                if response.changed() {
+                    let settings = CameraSettings { ymag: Some(ymag), ..CameraSettings::from(camera) };
+                    viewer.edit(ui, "camera", |s| s.camera = Some(settings));
+                }
+                response
+            });
+        }
+    }
+    let (mut aperture, mut focus) = (camera.aperture_radius, camera.focus_distance);
+    row(ui, APERTURE, false, |ui| {
+        let response = metres(ui, &mut aperture, 0.0);
+        if response.changed() {
+            viewer.move_rig(time, &mut |rig| rig.set_aperture_radius(aperture));
+        }
+        response
+    });
+    row(ui, FOCUS, false, |ui| {
+        let response = metres(ui, &mut focus, 1e-6);
+        if response.changed() {
+            viewer.move_rig(time, &mut |rig| rig.set_focus_distance(focus));
+        }
+        response
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    #[test]
+    fn flags_are_what_differs_in_the_camera() {
+        let camera = Camera::look_at("a", Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0);
+        let read = Settings { camera: Some((&camera).into()), ..Settings::default() };
+        let mut now = Settings { seed: Some(7), ..read.clone() };
+        assert_eq!(flags(&now, &read), "");
+        now.camera.as_mut().unwrap().position = Some([0.0, 0.5, 1.0]);
+        assert_eq!(flags(&now, &read), "--set 'camera.position=[0.0, 0.5, 1.0]'");
+    }
+
+    #[test]
+    fn cameras_are_named_where_a_name_means_one() {
+        let camera = |name: &str, z: f32| Camera::look_at(name, Vec3::Z * z, Vec3::ZERO, Vec3::Y, 1.0);
+        let cameras = vec![camera("a", 1.0), camera("b", 2.0), camera("b", 3.0), camera("", 4.0)];
+        let scene = Scene { cameras, ..Scene::default() };
+        for i in 0..4 {
+            let settings = Settings { camera: Some(chosen(&scene, i)), ..Settings::default() };
+            let found = settings.camera_of(&scene).unwrap();
+            assert_eq!(found.world_from_camera.translation.z, (i + 1) as f32);
+            assert_eq!(chosen(&scene, i).name.is_some(), i < 2);
+        }
+    }
+}

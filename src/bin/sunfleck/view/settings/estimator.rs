@@ -1,0 +1,213 @@
+//! How the light is computed.
+
+use eframe::egui;
+use egui::Ui;
+use sunfleck::ppm::Params;
+use sunfleck::scene::settings::{Count, Direct, FirstRadius, Kernel, Settings};
+
+use super::widgets::{Name, choice, count_of, count_text, metres, rounded, row, slider};
+use crate::view::app::Viewer;
+
+const PHOTONS: Name = Name {
+    name: "Photons",
+    hint: "Photon paths emitted an iteration: 500k, 1.5M. More of them make an iteration slower and its picture less \
+           noisy. Restarts the estimate.",
+};
+const ALPHA: Name = Name {
+    name: "Alpha",
+    hint: "α of Knaus & Zwicker, between 0 and 1: how slowly the radius shrinks. Smaller values lose blur sooner and \
+           noise later. Restarts the estimate.",
+};
+const RADIUS: Name = Name {
+    name: "First radius",
+    hint: "Distance within which the first iteration gathers photons: found for every pixel, or the same everywhere, \
+           metres. Restarts the estimate.",
+};
+const FIXED_RADIUS: Name = Name { name: "", hint: "First radius, metres. Restarts the estimate." };
+const KERNEL: Name =
+    Name { name: "Kernel", hint: "How a photon's weight falls with its distance. Restarts the estimate." };
+const DIRECT: Name =
+    Name { name: "Direct light", hint: "Who brings the light straight from a lamp. Restarts the estimate." };
+const LONGEST: Name = Name {
+    name: "Longest path",
+    hint: "Segments from lamp to lens, at most; what is longer is left out, which darkens the picture. 0: no limit. \
+           Restarts the estimate.",
+};
+const SEED: Name =
+    Name { name: "Seed", hint: "Another seed, other noise; the same seed, the same picture. Restarts the estimate." };
+const INDEX: Name = Name {
+    name: "Index",
+    hint: "What finds the photons near a point: sunfleck's own tree, or the ray tracing hardware of a graphics card. \
+           Chosen at the start: sunfleck view --index tree|hardware.",
+};
+
+pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
+    let now = &*viewer.settings();
+    let defaults = Params::new(1, 1);
+
+    let mut photons = f64::from(now.photons.map_or(defaults.n_paths, |n| n.0));
+    let mut changed = None;
+    let reset = row(ui, PHOTONS, now.photons != read.photons, |ui| {
+        let response = slider(ui, &mut photons, 1e3..=2e7, |slider| {
+            slider.logarithmic(true).custom_formatter(|n, _| count_text(n)).custom_parser(count_of)
+        });
+        if response.changed() {
+            let n = if response.dragged() { rounded(photons) } else { photons };
+            changed = Some(n.clamp(1.0, f64::from(u32::MAX)) as u32);
+        }
+        response
+    });
+    if let Some(n) = changed {
+        viewer.edit(ui, "photons", |s| s.photons = Some(Count(n)));
+    }
+    if reset {
+        viewer.reset(ui, |s| s.photons = read.photons);
+    }
+
+    let mut alpha = f64::from(now.alpha.unwrap_or(defaults.alpha));
+    let mut changed = false;
+    let reset = row(ui, ALPHA, now.alpha != read.alpha, |ui| {
+        let response = slider(ui, &mut alpha, 0.01..=0.99, |slider| slider.max_decimals(3));
+        changed = response.changed();
+        response
+    });
+    if changed {
+        viewer.edit(ui, "alpha", |s| s.alpha = Some((alpha as f32).clamp(1e-3, 0.999)));
+    }
+    if reset {
+        viewer.reset(ui, |s| s.alpha = read.alpha);
+    }
+
+    radius(ui, viewer, read, now);
+
+    let mut kernel = now.kernel.unwrap_or(Kernel::Epanechnikov);
+    let mut changed = false;
+    let reset = row(ui, KERNEL, now.kernel != read.kernel, |ui| {
+        let all = [
+            (Kernel::Epanechnikov, "Epanechnikov", "Falls to nothing at the radius: less blur."),
+            (Kernel::Constant, "Constant", "The same everywhere within the radius."),
+        ];
+        let response = choice(ui, "kernel", &mut kernel, &all);
+        changed = response.changed();
+        response
+    });
+    if changed {
+        viewer.edit(ui, "kernel", |s| s.kernel = Some(kernel));
+    }
+    if reset {
+        viewer.reset(ui, |s| s.kernel = read.kernel);
+    }
+
+    let mut direct = now.direct.unwrap_or(Direct::Sampled);
+    let mut changed = false;
+    let reset = row(ui, DIRECT, now.direct != read.direct, |ui| {
+        let all = [
+            (Direct::Sampled, "Sampled", "Lamps are sampled where the eye path ends: sharp shadows at once."),
+            (Direct::Photons, "Photons", "Photons bring all light, as in the literature."),
+        ];
+        let response = choice(ui, "direct", &mut direct, &all);
+        changed = response.changed();
+        response
+    });
+    if changed {
+        viewer.edit(ui, "direct", |s| s.direct = Some(direct));
+    }
+    if reset {
+        viewer.reset(ui, |s| s.direct = read.direct);
+    }
+
+    numbers(ui, viewer, read, now);
+
+    row(ui, INDEX, false, |ui| {
+        let text = match viewer.engine().index() {
+            "hardware" => "hardware (ray queries)",
+            other => other,
+        };
+        ui.add(egui::Label::new(text).truncate())
+    });
+}
+
+fn radius(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, now: &Settings) {
+    let mut fixed = match now.radius {
+        Some(FirstRadius::Fixed(radius)) => Some(radius),
+        _ => None,
+    };
+    let mut is_fixed = fixed.is_some();
+    let mut changed = false;
+    let reset = row(ui, RADIUS, now.radius != read.radius, |ui| {
+        let all = [
+            (false, "Automatic", "One for every pixel, from its size and the photons near it."),
+            (true, "Fixed", "The same everywhere, metres."),
+        ];
+        let response = choice(ui, "radius", &mut is_fixed, &all);
+        changed = response.changed();
+        response
+    });
+    if changed {
+        // Begins with what the automatic ones are like.
+        let automatic = viewer.now.frame.as_ref().map(|frame| frame.first_radius).filter(|r| *r > 0.0);
+        fixed = is_fixed.then(|| short(automatic.unwrap_or(0.01)));
+    }
+    if let Some(radius) = &mut fixed {
+        row(ui, FIXED_RADIUS, false, |ui| {
+            let response = metres(ui, radius, 1e-6);
+            changed |= response.changed();
+            response
+        });
+    }
+    if changed {
+        let radius = fixed.map_or(FirstRadius::Automatic, FirstRadius::Fixed);
+        viewer.edit(ui, "radius", |s| s.radius = Some(radius));
+    }
+    if reset {
+        viewer.reset(ui, |s| s.radius = read.radius);
+    }
+}
+
+/// The longest path and the seed.
+fn numbers(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, now: &Settings) {
+    let mut longest = now.max_segments.unwrap_or(0);
+    let mut changed = false;
+    let reset = row(ui, LONGEST, now.max_segments != read.max_segments, |ui| {
+        let drag = egui::DragValue::new(&mut longest).speed(1.0).range(0..=1000).update_while_editing(false);
+        let drag = drag.custom_formatter(|n, _| if n < 0.5 { "no limit".to_owned() } else { format!("{n:.0}") });
+        let response = ui.add_sized(egui::vec2(ui.available_width(), ui.spacing().interact_size.y), drag);
+        changed = response.changed();
+        response
+    });
+    if changed {
+        viewer.edit(ui, "longest path", |s| s.max_segments = (longest > 0).then_some(longest));
+    }
+    if reset {
+        viewer.reset(ui, |s| s.max_segments = read.max_segments);
+    }
+
+    let mut seed = now.seed.unwrap_or(0);
+    let mut changed = false;
+    let reset = row(ui, SEED, now.seed != read.seed, |ui| {
+        let drag = egui::DragValue::new(&mut seed).speed(1.0).update_while_editing(false);
+        let response = ui.add_sized(egui::vec2(ui.available_width(), ui.spacing().interact_size.y), drag);
+        changed = response.changed();
+        response
+    });
+    if changed {
+        viewer.edit(ui, "seed", |s| s.seed = Some(seed));
+    }
+    if reset {
+        viewer.reset(ui, |s| s.seed = read.seed);
+    }
+}
+
+/// To two significant digits.
+fn short(x: f32) -> f32 {
+    format!("{x:.1e}").parse().unwrap_or(x)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn radii_begin_short() {
+        assert_eq!(super::short(0.012_345), 0.012);
+        assert_eq!(super::short(3.0), 3.0);
+    }
+}

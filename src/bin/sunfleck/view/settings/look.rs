@@ -1,0 +1,125 @@
+//! The picture's size, and how it is shown.
+
+use eframe::egui;
+use egui::{DragValue, Ui};
+use sunfleck::output::tonemap::ToneMap;
+use sunfleck::scene::settings::{Settings, Size};
+
+use super::widgets::{Name, choice, row, slider};
+use crate::view::app::Viewer;
+
+const SIZE: Name = Name { name: "Size", hint: "Width and height of the picture, pixels. Restarts the estimate." };
+const EXPOSURE: Name = Name {
+    name: "Exposure",
+    hint: "Stops (powers of two) that the picture is brightened by: found by itself, or given. Does not restart the \
+           estimate.",
+};
+const STOPS: Name = Name { name: "", hint: "Exposure, stops. Does not restart the estimate." };
+const TONE: Name = Name {
+    name: "Tone curve",
+    hint: "How bright light is fitted into what a screen can show. Does not restart the estimate.",
+};
+
+const PRESETS: [([u32; 2], &str); 8] = [
+    ([640, 360], "640 × 360"),
+    ([1280, 720], "1280 × 720 (HD)"),
+    ([1920, 1080], "1920 × 1080 (Full HD)"),
+    ([2560, 1440], "2560 × 1440"),
+    ([3840, 2160], "3840 × 2160 (4K)"),
+    ([512, 512], "512 × 512"),
+    ([1024, 1024], "1024 × 1024"),
+    ([2048, 1024], "2048 × 1024"),
+];
+/// Width and height, at most; as settings allow.
+const MOST: u32 = 16_384;
+
+pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
+    size(ui, viewer, read);
+    exposure(ui, viewer);
+    let mut changed = false;
+    let mut tone = viewer.wanted.painting.look.tonemap;
+    let reset = row(ui, TONE, tone != ToneMap::default(), |ui| {
+        let all = [
+            (
+                ToneMap::Neutral,
+                "PBR Neutral",
+                "Khronos PBR Neutral: colours stay as they are, highlights are compressed.",
+            ),
+            (ToneMap::Agx, "AgX", "Film-like: bright saturated colours fade to white."),
+            (ToneMap::Srgb, "sRGB", "None: what is too bright is cut off."),
+        ];
+        let response = choice(ui, "tone", &mut tone, &all);
+        changed = response.changed();
+        response
+    });
+    if changed || reset {
+        viewer.wanted.painting.look.tonemap = if reset { ToneMap::default() } else { tone };
+    }
+}
+
+fn size(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
+    let Some(mut size) = viewer.full_size() else { return };
+    let mut chosen = None;
+    let now = viewer.settings();
+    let reset = row(ui, SIZE, now.size != read.size, |ui| {
+        let each = egui::vec2(((ui.available_width() - 18.0) / 2.0).max(20.0), ui.spacing().interact_size.y);
+        let [width, height] = &mut size;
+        let drag = |side| DragValue::new(side).range(1..=MOST).speed(2.0).update_while_editing(false);
+        let mut response = ui.add_sized(each, drag(width));
+        response |= ui.label("×");
+        response |= ui.add_sized(each, drag(height));
+        if response.changed() {
+            chosen = Some(size);
+        }
+        response
+    });
+    ui.horizontal_wrapped(|ui| {
+        let presets = ui.menu_button("Presets", |ui| {
+            for (preset, name) in PRESETS {
+                if ui.button(name).clicked() {
+                    chosen = Some(preset);
+                }
+            }
+        });
+        presets.response.on_hover_text("Usual sizes, pixels. Restarts the estimate.");
+        let area = viewer.picture.area.map(|area| area.size() * ui.pixels_per_point());
+        let hint = "As many pixels as there is room for in the window, now. Restarts the estimate.";
+        if ui.add_enabled(area.is_some(), egui::Button::new("As large as the window")).on_hover_text(hint).clicked() {
+            chosen = area.map(|area| [area.x, area.y].map(|side| (side as u32).clamp(1, MOST)));
+        }
+    });
+    if let Some(size) = chosen {
+        viewer.edit(ui, "size", |s| s.size = Some(Size(size)));
+    }
+    if reset {
+        viewer.reset(ui, |s| s.size = read.size);
+    }
+}
+
+fn exposure(ui: &mut Ui, viewer: &mut Viewer) {
+    let read = viewer.opened().and_then(|opened| opened.source.settings.exposure);
+    let shown = viewer.now.painted.as_ref().map_or(0.0, |painted| painted.exposure);
+    let look = &mut viewer.wanted.painting.look;
+    let mut is_given = look.exposure.is_some();
+    let mut changed = false;
+    let reset = row(ui, EXPOSURE, look.exposure != read, |ui| {
+        let all = [(false, "Automatic", "From the picture's own brightness."), (true, "Given", "So many stops.")];
+        let response = choice(ui, "exposure", &mut is_given, &all);
+        changed = response.changed();
+        response
+    });
+    if changed {
+        look.exposure = is_given.then_some((shown * 10.0).round() / 10.0);
+    }
+    let mut stops = f64::from(look.exposure.unwrap_or(shown));
+    row(ui, STOPS, false, |ui| {
+        let response = slider(ui, &mut stops, -10.0..=10.0, |slider| slider.fixed_decimals(1).suffix(" EV"));
+        if response.changed() {
+            look.exposure = Some((stops as f32).clamp(-64.0, 64.0));
+        }
+        response
+    });
+    if reset {
+        look.exposure = read;
+    }
+}

@@ -1,0 +1,66 @@
+//! The panel on the left: everything that settings can say, each with its way back to what the file says.
+
+mod camera;
+mod estimator;
+mod look;
+mod material;
+mod scene;
+mod widgets;
+
+use std::sync::Arc;
+
+use eframe::egui;
+use egui::Ui;
+use sunfleck::scene::settings::Settings;
+
+use super::app::Viewer;
+
+type Group = fn(&mut Ui, &mut Viewer, &Settings);
+
+const GROUPS: [(&str, &str, bool, Group); 6] = [
+    ("Estimator", "How the light is computed", true, estimator::show),
+    ("Picture", "Its size, and how it is shown", true, look::show),
+    ("Camera", "What the picture is taken with", true, camera::show),
+    ("Environment", "Light from infinitely far away", false, scene::environment),
+    ("Selected object", "The material of what was clicked on in the picture", true, material::show),
+    ("Lights", "The strength of all lights, and the lamps without extent", false, scene::lights),
+];
+
+pub fn show(ui: &mut Ui, viewer: &mut Viewer) {
+    let Some(opened) = viewer.opened().cloned() else { return };
+    let read = &opened.read;
+    ui.add_space(4.0);
+    ui.horizontal(|ui| {
+        ui.strong("Settings");
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            let is_changed = **viewer.edits.now() != *read;
+            let button = ui.add_enabled(is_changed, egui::Button::new("Reset all").small());
+            if button.on_hover_text("Back to what the file says. Restarts the estimate.").clicked() {
+                viewer.reset(ui, |s| *s = read.clone());
+            }
+        });
+    });
+    ui.separator();
+    egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        for (title, hint, is_open, group) in GROUPS {
+            let header = egui::CollapsingHeader::new(egui::RichText::new(title).strong()).default_open(is_open);
+            let response = header.show_unindented(ui, |ui| group(ui, viewer, read));
+            response.header_response.on_hover_text(hint);
+            ui.add_space(2.0);
+        }
+    });
+}
+
+impl Viewer {
+    /// Changes settings back: a step of its own.
+    fn reset(&mut self, ui: &Ui, change: impl FnOnce(&mut Settings)) {
+        self.edits.end_step();
+        self.edit(ui, "reset", change);
+        self.edits.end_step();
+    }
+
+    /// The settings, for a panel to look at while it changes them.
+    fn settings(&self) -> Arc<Settings> {
+        Arc::clone(self.edits.now())
+    }
+}

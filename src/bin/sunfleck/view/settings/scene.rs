@@ -1,0 +1,283 @@
+//! What is lit, and by what: environment, the selected material, lights.
+
+use eframe::egui;
+use egui::Ui;
+use glam::Vec3;
+use sunfleck::scene::defaults::has_light;
+use sunfleck::scene::settings::{EnvironmentSettings, MaterialSettings, SceneLightSettings, Settings};
+use sunfleck::scene::{PunctualKind, PunctualLight, Scene};
+
+use super::widgets::{Name, back, row, slider};
+use crate::view::app::Viewer;
+
+const SOURCE: Name = Name { name: "Source", hint: "Where the light from infinitely far away comes from." };
+const ROTATION: Name = Name {
+    name: "Rotation",
+    hint: "Turns the environment about the y axis, counter-clockwise seen from above, degrees. Restarts the estimate.",
+};
+const STRENGTH: Name = Name { name: "Strength", hint: "Factor on the environment's light. Restarts the estimate." };
+const COLOR: Name = Name { name: "Colour", hint: "Radiance all around, linear RGB. Restarts the estimate." };
+const SCALE: Name = Name {
+    name: "Light scale",
+    hint: "Factor on every light: lamps, glowing surfaces, environment. Restarts the estimate.",
+};
+/// What shines from all around.
+enum Sky {
+    File(String),
+    Color([f32; 3]),
+    Own { rotation: f32, strength: f32 },
+    Default,
+    None,
+}
+
+impl Sky {
+    fn new(settings: &Settings, scene: &Scene) -> Self {
+        let given = settings.environment.clone().unwrap_or_default();
+        match (given.file, given.color, &scene.environment) {
+            (Some(file), ..) => Self::File(file),
+            (None, Some(color), _) => Self::Color(color),
+            (None, None, Some(own)) => Self::Own { rotation: own.rotation.to_degrees(), strength: own.strength },
+            (None, None, None) if has_light(scene) || !settings.lights.is_empty() => Self::None,
+            (None, None, None) => Self::Default,
+        }
+    }
+}
+
+pub fn environment(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
+    let Some(opened) = viewer.opened().cloned() else { return };
+    let now = viewer.settings();
+    let sky = Sky::new(&now, &opened.loaded.scene);
+    let was = read.environment.clone().unwrap_or_default();
+    let given = now.environment.clone().unwrap_or_default();
+    let is_other = (&given.file, given.color.is_some()) != (&was.file, was.color.is_some());
+    let reset = row(ui, SOURCE, is_other, |ui| {
+        let text = match &sky {
+            Sky::File(file) => file,
+            Sky::Color(_) => "one colour",
+            Sky::Own { .. } => "the scene's own",
+            Sky::Default => "a soft sky, as nothing else gives light",
+            Sky::None => "none",
+        };
+        ui.add(egui::Label::new(text).truncate())
+    });
+    if reset {
+        viewer.reset(ui, |s| s.environment = read.environment.clone());
+        return;
+    }
+    if matches!(sky, Sky::None) {
+        let hint = "The same light from everywhere. Restarts the estimate.";
+        if ui.button("Add one colour all around").on_hover_text(hint).clicked() {
+            let grey = EnvironmentSettings { color: Some([0.5; 3]), ..EnvironmentSettings::default() };
+            viewer.edit(ui, "environment", |s| s.environment = Some(grey));
+        }
+        return;
+    }
+    if let Sky::Color(mut color) = sky {
+        let mut changed = false;
+        let reset = row(ui, COLOR, was.color.is_some() && given.color != was.color, |ui| {
+            let response = ui.color_edit_button_rgb(&mut color);
+            changed = response.changed();
+            response
+        });
+        if changed || reset {
+            let color = if reset { was.color } else { Some(color) };
+            edit_sky(ui, viewer, "environment colour", read, |sky| sky.color = color);
+        }
+    }
+    let (rotation, strength) = match sky {
+        Sky::Own { rotation, strength } => (rotation, strength),
+        _ => (0.0, 1.0),
+    };
+    let rows = [
+        (ROTATION, given.rotation_degrees, was.rotation_degrees, rotation),
+        (STRENGTH, given.strength, was.strength, strength),
+    ];
+    for (i, (name, value, old, default)) in rows.into_iter().enumerate() {
+        let mut shown = f64::from(value.unwrap_or(default));
+        let mut changed = false;
+        let reset = row(ui, name, value != old, |ui| {
+            let range = if i == 0 { -180.0..=180.0 } else { 0.0..=100.0 };
+            let response = slider(ui, &mut shown, range, |slider| match i {
+                0 => slider.max_decimals(1).suffix("°"),
+                _ => logarithmic(slider),
+            });
+            changed = response.changed();
+            response
+        });
+        if changed || reset {
+            let value = if reset { old } else { Some(shown as f32) };
+            edit_sky(ui, viewer, name.name, read, |sky| match i {
+                0 => sky.rotation_degrees = value,
+                _ => sky.strength = value.map(|v| v.max(0.0)),
+            });
+        }
+    }
+}
+
+/// Nothing is left where nothing is said.
+fn edit_sky(
+    ui: &Ui,
+    viewer: &mut Viewer,
+    what: &'static str,
+    read: &Settings,
+    change: impl FnOnce(&mut EnvironmentSettings),
+) {
+    viewer.edit(ui, what, |s| {
+        let mut sky = s.environment.take().unwrap_or_default();
+        change(&mut sky);
+        let is_empty = sky == EnvironmentSettings::default() && read.environment.is_none();
+        s.environment = (!is_empty).then_some(sky);
+    });
+}
+
+/// For factors.
+pub fn logarithmic(slider: egui::Slider<'_>) -> egui::Slider<'_> {
+    slider.logarithmic(true).smallest_positive(0.01).max_decimals(3)
+}
+
+pub fn lights(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
+    let Some(opened) = viewer.opened().cloned() else { return };
+    let scene = &opened.loaded.scene;
+    let now = viewer.settings();
+    let mut scale = f64::from(now.light_scale.unwrap_or(1.0));
+    let mut changed = false;
+    let reset = row(ui, SCALE, now.light_scale != read.light_scale, |ui| {
+        let response = slider(ui, &mut scale, 0.0..=100.0, logarithmic);
+        changed = response.changed();
+        response
+    });
+    if changed {
+        viewer.edit(ui, "light scale", |s| s.light_scale = Some((scale as f32).max(0.0)));
+    }
+    if reset {
+        viewer.reset(ui, |s| s.light_scale = read.light_scale);
+    }
+    if scene.lights.is_empty() {
+        ui.weak("The scene has no point, spot or directional lights.");
+        return;
+    }
+    let height = ui.spacing().interact_size.y;
+    let area = egui::ScrollArea::vertical().id_salt("lights").max_height(12.0 * height);
+    area.show_rows(ui, height, scene.lights.len(), |ui, range| {
+        for i in range {
+            light(ui, viewer, read, scene, i);
+        }
+    });
+}
+
+/// One line: on, colour, strength.
+fn light(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, i: usize) {
+    let light = &scene.lights[i];
+    let was = read.clone().scene_light_mut(scene, i).clone();
+    let mut now = viewer.settings().as_ref().clone().scene_light_mut(scene, i).clone();
+    let before = now.clone();
+    let mut reset = false;
+    ui.push_id(i, |ui| {
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            let mut on = now.on != Some(false);
+            let name = if light.name.is_empty() { format!("light {i}") } else { light.name.clone() };
+            let width = (ui.available_width() - 140.0).max(40.0);
+            let height = ui.spacing().interact_size.y;
+            ui.allocate_ui_with_layout(
+                egui::vec2(width, height),
+                egui::Layout::left_to_right(egui::Align::Center),
+                |ui| {
+                    ui.set_min_width(width);
+                    ui.set_max_width(width);
+                    let hint = format!("{name}, {}: whether it shines. Restarts the estimate.", kind(light));
+                    if ui.add(egui::Checkbox::new(&mut on, egui::RichText::new(&name))).on_hover_text(hint).changed() {
+                        now.on = Some(on);
+                    }
+                },
+            );
+            let mut color = now.color.unwrap_or_else(|| hue(light.intensity));
+            let hint = "Its colour, linear RGB; it stays as bright. Restarts the estimate.";
+            if ui.color_edit_button_rgb(&mut color).on_hover_text(hint).changed() && color != [0.0; 3] {
+                now.color = Some(color);
+            }
+            let mut strength = now.strength.unwrap_or(1.0);
+            let speed = 0.01 * strength.max(0.1);
+            let drag = egui::DragValue::new(&mut strength).speed(speed).range(0.0..=1e6).max_decimals(3).prefix("× ");
+            let hint =
+                format!("Factor on its {:.4} {}. Restarts the estimate.", light.intensity.max_element(), unit(light));
+            if ui.add_sized(egui::vec2(62.0, height), drag.update_while_editing(false)).on_hover_text(hint).changed() {
+                now.strength = Some(strength);
+            }
+            if before != was {
+                reset = back(ui, &name);
+            }
+        });
+    });
+    if reset {
+        viewer.reset(ui, |s| {
+            *s.scene_light_mut(scene, i) = was;
+            tidy(s, read);
+        });
+    } else if now != before {
+        viewer.edit(ui, "light", |s| *s.scene_light_mut(scene, i) = now);
+    }
+}
+
+fn kind(light: &PunctualLight) -> &'static str {
+    match light.kind {
+        PunctualKind::Point => "a point light",
+        PunctualKind::Spot { .. } => "a spot light",
+        PunctualKind::Directional => "a directional light",
+    }
+}
+
+fn unit(light: &PunctualLight) -> &'static str {
+    match light.kind {
+        PunctualKind::Point | PunctualKind::Spot { .. } => "cd",
+        PunctualKind::Directional => "lx",
+    }
+}
+
+/// The colour of light of any strength.
+fn hue(intensity: Vec3) -> [f32; 3] {
+    let most = intensity.max_element();
+    if most > 0.0 { (intensity / most).to_array() } else { [1.0; 3] }
+}
+
+/// Takes away changes that change nothing and that the file does not have.
+pub fn tidy(settings: &mut Settings, read: &Settings) {
+    settings.materials.retain(|m| {
+        let target = MaterialSettings { name: m.name.clone(), index: m.index, ..MaterialSettings::default() };
+        *m != target || read.materials.contains(m)
+    });
+    settings.scene_lights.retain(|l| {
+        let target = SceneLightSettings { name: l.name.clone(), index: l.index, ..SceneLightSettings::default() };
+        *l != target || read.scene_lights.contains(l)
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sunfleck::scene::Material;
+
+    #[test]
+    fn changes_of_nothing_are_tidied_away() {
+        let scene = Scene {
+            materials: vec![Material::diffuse("a", Vec3::ONE), Material::diffuse("b", Vec3::ONE)],
+            ..Scene::default()
+        };
+        let mut read = Settings::default();
+        read.material_mut(&scene, 0);
+        let mut now = read.clone();
+        now.material_mut(&scene, 1).ior = Some(2.0);
+        let changed = now.clone();
+        tidy(&mut now, &read);
+        assert_eq!(now, changed);
+        now.material_mut(&scene, 1).ior = None;
+        tidy(&mut now, &read);
+        assert_eq!(now, read);
+    }
+
+    #[test]
+    fn hues_have_no_strength() {
+        assert_eq!(hue(Vec3::new(4.0, 2.0, 0.0)), [1.0, 0.5, 0.0]);
+        assert_eq!(hue(Vec3::ZERO), [1.0; 3]);
+    }
+}

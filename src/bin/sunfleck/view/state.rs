@@ -1,0 +1,154 @@
+//! What the window keeps: settings with undo, and what is remembered from one run to the next.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use sunfleck::scene::settings::Settings;
+
+/// Files that are remembered.
+const MOST_RECENT: usize = 12;
+/// Steps that can be undone.
+const MOST_UNDONE: usize = 256;
+
+/// Settings, and how to go back to what they were.
+#[derive(Clone, Debug, Default)]
+pub struct Edits {
+    now: Arc<Settings>,
+    undo: Vec<Arc<Settings>>,
+    redo: Vec<Arc<Settings>>,
+    /// What the last edit was of, and when: a drag is one step.
+    last: Option<(&'static str, f64)>,
+}
+
+impl Edits {
+    /// Edits of the same thing within so many seconds are one step.
+    const ONE_STEP: f64 = 0.7;
+
+    pub fn new(settings: Settings) -> Self {
+        Self { now: Arc::new(settings), ..Self::default() }
+    }
+
+    pub fn now(&self) -> &Arc<Settings> {
+        &self.now
+    }
+
+    /// Replaces the settings; `what` is edited at `time`, seconds.
+    pub fn set(&mut self, what: &'static str, time: f64, settings: Settings) {
+        if settings == *self.now {
+            return;
+        }
+        let goes_on = self.last.is_some_and(|(last, when)| last == what && time - when < Self::ONE_STEP);
+        if !goes_on {
+            self.undo.push(Arc::clone(&self.now));
+            if self.undo.len() > MOST_UNDONE {
+                self.undo.remove(0);
+            }
+        }
+        self.redo.clear();
+        self.last = Some((what, time));
+        self.now = Arc::new(settings);
+    }
+
+    /// The next edit is a step of its own, whatever it is of.
+    pub fn end_step(&mut self) {
+        self.last = None;
+    }
+
+    pub fn can_undo(&self) -> bool {
+        !self.undo.is_empty()
+    }
+
+    pub fn can_redo(&self) -> bool {
+        !self.redo.is_empty()
+    }
+
+    pub fn undo(&mut self) {
+        if let Some(settings) = self.undo.pop() {
+            self.redo.push(std::mem::replace(&mut self.now, settings));
+            self.last = None;
+        }
+    }
+
+    pub fn redo(&mut self) {
+        if let Some(settings) = self.redo.pop() {
+            self.undo.push(std::mem::replace(&mut self.now, settings));
+            self.last = None;
+        }
+    }
+}
+
+/// From one run to the next.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Remembered {
+    /// The newest first.
+    pub recent: Vec<String>,
+    pub show_settings: bool,
+    pub show_inspect: bool,
+    pub show_convergence: bool,
+}
+
+impl Default for Remembered {
+    fn default() -> Self {
+        Self { recent: vec![], show_settings: true, show_inspect: true, show_convergence: false }
+    }
+}
+
+impl Remembered {
+    /// Puts a file first; names of shipped scenes are not remembered.
+    pub fn opened(&mut self, name: &str) {
+        let Ok(path) = Path::new(name).canonicalize() else { return };
+        let path = path.to_string_lossy().into_owned();
+        self.recent.retain(|other| *other != path);
+        self.recent.insert(0, path);
+        self.recent.truncate(MOST_RECENT);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with_alpha(alpha: f32) -> Settings {
+        Settings { alpha: Some(alpha), ..Settings::default() }
+    }
+
+    #[test]
+    fn a_drag_is_one_step() {
+        let mut edits = Edits::new(with_alpha(0.1));
+        for i in 0..10 {
+            edits.set("alpha", 0.1 * f64::from(i), with_alpha(0.2 + 0.01 * i as f32));
+        }
+        edits.set("seed", 1.0, Settings { seed: Some(3), ..edits.now().as_ref().clone() });
+        edits.set("seed", 9.0, Settings { seed: Some(4), ..edits.now().as_ref().clone() });
+        edits.undo();
+        assert_eq!(edits.now().seed, Some(3));
+        edits.undo();
+        assert_eq!((edits.now().seed, edits.now().alpha), (None, Some(0.29)));
+        edits.undo();
+        assert_eq!(edits.now().alpha, Some(0.1));
+        assert!(!edits.can_undo() && edits.can_redo());
+        edits.undo();
+        edits.redo();
+        assert_eq!(edits.now().alpha, Some(0.29));
+        edits.set("alpha", 20.0, with_alpha(0.5));
+        assert!(!edits.can_redo());
+    }
+
+    #[test]
+    fn recent_files_are_the_newest_first_and_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, "").unwrap();
+            path.to_string_lossy().into_owned()
+        };
+        let mut remembered = Remembered::default();
+        for name in [file("a.obj"), file("b.obj"), file("a.obj"), "no such file".to_owned(), "glass".to_owned()] {
+            remembered.opened(&name);
+        }
+        let names: Vec<_> = remembered.recent.iter().map(|p| Path::new(p).file_name().unwrap().to_owned()).collect();
+        assert_eq!(names, ["a.obj", "b.obj"]);
+    }
+}

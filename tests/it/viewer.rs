@@ -1,0 +1,215 @@
+//! The window as its users meet it: the real program on a display of its own, driven by keys and mouse.
+
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use exr::meta::MetaData;
+use exr::meta::attribute::{AttributeValue, Text};
+use sunfleck::output;
+use x11rb::connection::Connection;
+use x11rb::protocol::xproto::{
+    AtomEnum, BUTTON_PRESS_EVENT, BUTTON_RELEASE_EVENT, ConnectionExt, InputFocus, KEY_PRESS_EVENT, KEY_RELEASE_EVENT,
+    MOTION_NOTIFY_EVENT, MapState, Window,
+};
+use x11rb::protocol::xtest::ConnectionExt as _;
+use x11rb::rust_connection::RustConnection;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_sunfleck");
+
+/// For anything that is waited for: a loaded machine compiles the kernels first.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+const CONTROL: u32 = 0xffe3;
+const LEFT: u8 = 1;
+
+/// Ends with the test, however that ends.
+struct Process(Child);
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// An X server without a screen, and what types and points there.
+struct Display {
+    _server: Process,
+    name: String,
+    connection: RustConnection,
+    root: Window,
+    /// Keysyms by keycode.
+    keys: Vec<(u8, Vec<u32>)>,
+}
+
+impl Display {
+    /// `None` if there is no Xvfb.
+    fn start() -> Option<Self> {
+        let mut command = Command::new("Xvfb");
+        command.args(["-displayfd", "1", "-screen", "0", "1280x720x24", "-nolisten", "tcp"]);
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().ok()?;
+        let stdout = child.stdout.take().unwrap();
+        let server = Process(child);
+        let mut number = String::new();
+        BufReader::new(stdout).read_line(&mut number).unwrap();
+        let name = format!(":{}", number.trim());
+        let (connection, screen) = x11rb::connect(Some(&name)).unwrap();
+        let setup = connection.setup();
+        let root = setup.roots[screen].root;
+        let (first, last) = (setup.min_keycode, setup.max_keycode);
+        let map = connection.get_keyboard_mapping(first, last - first + 1).unwrap().reply().unwrap();
+        let columns = usize::from(map.keysyms_per_keycode);
+        let keys = (first..=last).zip(map.keysyms.chunks(columns).map(<[u32]>::to_vec)).collect();
+        Some(Self { _server: server, name, connection, root, keys })
+    }
+
+    fn fake(&self, event: u8, detail: u8, at: [i16; 2]) {
+        self.connection.xtest_fake_input(event, detail, 0, self.root, at[0], at[1], 0).unwrap().check().unwrap();
+    }
+
+    /// Presses keys in this order, and lets go of them.
+    fn press(&self, keysyms: &[u32]) {
+        let code = |keysym: &u32| self.keys.iter().find(|(_, syms)| syms.first() == Some(keysym)).unwrap().0;
+        let codes: Vec<u8> = keysyms.iter().map(code).collect();
+        codes.iter().for_each(|&code| self.fake(KEY_PRESS_EVENT, code, [0, 0]));
+        codes.iter().rev().for_each(|&code| self.fake(KEY_RELEASE_EVENT, code, [0, 0]));
+    }
+
+    fn point(&self, x: i16, y: i16) {
+        self.fake(MOTION_NOTIFY_EVENT, 0, [x, y]);
+    }
+
+    /// The window of the program, and what it is called.
+    fn window(&self) -> Option<(Window, String)> {
+        let name = self.connection.intern_atom(false, b"_NET_WM_NAME").unwrap().reply().unwrap().atom;
+        let tree = self.connection.query_tree(self.root).unwrap().reply().unwrap();
+        tree.children.iter().find_map(|&window| {
+            let is_shown = self.connection.get_window_attributes(window).unwrap().reply().ok()?.map_state;
+            let title =
+                self.connection.get_property(false, window, name, AtomEnum::ANY, 0, 1000).unwrap().reply().ok()?;
+            let title = String::from_utf8(title.value).ok()?;
+            (is_shown == MapState::VIEWABLE && title.contains("Sunfleck")).then_some((window, title))
+        })
+    }
+}
+
+/// Asks until there is an answer.
+fn wait_for<T>(what: &str, viewer: &mut Process, mut ask: impl FnMut() -> Option<T>) -> T {
+    let began = Instant::now();
+    loop {
+        if let Some(answer) = ask() {
+            return answer;
+        }
+        if let Some(status) = viewer.0.try_wait().unwrap() {
+            panic!("waiting for {what}, but the program has ended: {status}");
+        }
+        assert!(began.elapsed() < PATIENCE, "no {what}");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// Text from the header of a picture; `None` while it is not there.
+fn text(path: &Path, name: &str) -> Option<String> {
+    let meta = MetaData::read_from_file(path, true).ok()?;
+    match meta.headers[0].own_attributes.other.get(&Text::new_or_panic(name)) {
+        Some(AttributeValue::Text(text)) => Some(text.to_string()),
+        other => panic!("{name}: {other:?}"),
+    }
+}
+
+/// Opens a scene, orbits, changes a setting, saves, quits; what was saved is what its command renders.
+#[test]
+fn a_picture_saved_in_the_window_is_what_its_command_renders() {
+    const ITERATIONS: &str = "5";
+    let is_required = std::env::var_os("SUNFLECK_REQUIRE_GPU").is_some();
+    let skip = |why: &str| {
+        assert!(!is_required, "SUNFLECK_REQUIRE_GPU is set, but: {why}");
+        println!("skipped: {why}");
+    };
+    let devices = Command::new(PROGRAM).arg("--list-devices").output().unwrap().stdout;
+    if devices.iter().filter(|c| **c == b'\n').count() < 2 {
+        return skip("no GPU adapter");
+    }
+    let Some(display) = Display::start() else { return skip("no Xvfb") };
+    let folder = tempfile::tempdir().unwrap();
+    let [saved, kept, log] = ["saved.exr", "kept.exr", "stderr.txt"].map(|name| folder.path().join(name));
+
+    let mut command = Command::new(PROGRAM);
+    command.args(["view", "cornell", "--backend", "gpu", "--iterations", ITERATIONS, "-o"]).arg(&saved);
+    command.args(["--set", "size=64x48", "--set", "photons=4k"]);
+    command.env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY").current_dir(folder.path());
+    for home in ["XDG_DATA_HOME", "XDG_CONFIG_HOME", "XDG_STATE_HOME"] {
+        command.env(home, folder.path());
+    }
+    let mut viewer = Process(command.stderr(File::create(&log).unwrap()).spawn().unwrap());
+
+    let title = format!("cornell – {ITERATIONS} iterations – Sunfleck");
+    let iterated = || display.window().filter(|(_, now)| *now == title);
+    let (window, _) = wait_for("iterations", &mut viewer, iterated);
+    let focused = |window| {
+        let _ = display.connection.set_input_focus(InputFocus::PARENT, window, x11rb::CURRENT_TIME).unwrap().check();
+        let focus = display.connection.get_input_focus().unwrap().reply().unwrap().focus;
+        (focus == window).then_some(())
+    };
+    wait_for("focus", &mut viewer, || focused(window));
+    // Orbits, back and forth until the picture is another one.
+    display.point(640, 360);
+    display.fake(BUTTON_PRESS_EVENT, LEFT, [0, 0]);
+    let mut steps = 0;
+    wait_for("orbit", &mut viewer, || {
+        steps += 1;
+        display.point(640 + steps % 100, 360);
+        display.window().filter(|(_, now)| *now != title).map(|_| ())
+    });
+    display.fake(BUTTON_RELEASE_EVENT, LEFT, [0, 0]);
+    display.press(&[u32::from(b'-')]);
+    // Both restart the estimate; a picture that is saved too early is saved again.
+    let command = wait_for("picture with all changes", &mut viewer, || {
+        iterated()?;
+        let _ = fs::remove_file(&saved);
+        display.press(&[CONTROL, u32::from(b's')]);
+        let began = Instant::now();
+        let command = loop {
+            match text(&saved, "command") {
+                Some(command) => break command,
+                None if began.elapsed() > Duration::from_secs(5) => return None,
+                None => std::thread::sleep(Duration::from_millis(10)),
+            }
+        };
+        let parts = ["camera.", "photons=2", &format!("--iterations {ITERATIONS} ")];
+        parts.iter().all(|part| command.contains(part)).then_some(command)
+    });
+    display.press(&[CONTROL, u32::from(b'q')]);
+    let began = Instant::now();
+    let status = loop {
+        if let Some(status) = viewer.0.try_wait().unwrap() {
+            break status;
+        }
+        assert!(began.elapsed() < PATIENCE, "it does not quit");
+        std::thread::sleep(Duration::from_millis(10));
+    };
+    let log = fs::read_to_string(&log).unwrap();
+    assert!(status.success(), "{status}: {log}");
+    let bad = ["panicked", "alidation", "error"];
+    assert!(!bad.iter().any(|word| log.contains(word)), "{log}");
+
+    // As a shell takes it, with the program's folder first on the path.
+    fs::rename(&saved, &kept).unwrap();
+    let path = Path::new(PROGRAM).parent().unwrap().display().to_string();
+    let path = format!("{path}:{}", std::env::var("PATH").unwrap_or_default());
+    let mut shell = Command::new("sh");
+    shell.arg("-c").arg(format!("{command} --backend gpu --quiet")).env("PATH", path).current_dir(folder.path());
+    let rendered = shell.output().unwrap();
+    assert!(rendered.status.success(), "{command}: {}", String::from_utf8_lossy(&rendered.stderr));
+    let [kept, rendered] = [&kept, &saved].map(|path| output::exr::read(path).unwrap());
+    assert_eq!((kept.size, kept.rgb.len()), ([64, 48], 64 * 48));
+    assert_eq!(kept.size, rendered.size);
+    let is_close = |(a, b): (&f32, &f32)| (a - b).abs() <= 1e-5 * (1e-3 + a.abs().max(b.abs()));
+    let n_far = kept.rgb.as_flattened().iter().zip(rendered.rgb.as_flattened()).filter(|pair| !is_close(*pair)).count();
+    let n_equal = kept.rgb.iter().zip(&rendered.rgb).filter(|(a, b)| a == b).count();
+    println!("{command}\n{n_equal} of {} pixels are the same in every bit", kept.rgb.len());
+    assert_eq!(n_far, 0, "values that differ by more than rounding");
+}
