@@ -159,7 +159,8 @@ pub fn iterate_while<S: Stages + ?Sized>(
     frame: &layout::Frame,
     mut go_on: impl FnMut() -> bool,
 ) -> Result<bool, Error> {
-    let order: [fn(&mut S, &layout::Frame) -> Result<(), Error>; 5] = [
+    type Stage<S> = fn(&mut S, &layout::Frame) -> Result<(), Error>;
+    let order: [Stage<S>; 5] = [
         S::trace_eye,     // pixels → EyeVertex[w·h]
         S::trace_photons, // lights → Photon[n]
         S::build_index,   // Photon[n] → tree over photons
