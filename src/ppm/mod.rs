@@ -150,9 +150,28 @@ pub fn start<S: Stages + ?Sized>(stages: &mut S, params: &Params) -> Result<Vec<
 
 /// One iteration: the algorithm on one screen.
 pub fn iterate<S: Stages + ?Sized>(stages: &mut S, frame: &layout::Frame) -> Result<(), Error> {
-    stages.trace_eye(frame)?; // pixels → EyeVertex[w·h]
-    stages.trace_photons(frame)?; // lights → Photon[n]
-    stages.build_index(frame)?; // Photon[n] → tree over photons
-    stages.gather(frame)?; // EyeVertex, tree → radiance[w·h]
-    stages.accumulate(frame) // radiance → film
+    iterate_while(stages, frame, || true).map(|_| ())
+}
+
+/// The same as long as `go_on`, which is asked before every stage: whether the film has the iteration.
+pub fn iterate_while<S: Stages + ?Sized>(
+    stages: &mut S,
+    frame: &layout::Frame,
+    mut go_on: impl FnMut() -> bool,
+) -> Result<bool, Error> {
+    type Stage<S> = fn(&mut S, &layout::Frame) -> Result<(), Error>;
+    let order: [Stage<S>; 5] = [
+        S::trace_eye,     // pixels → EyeVertex[w·h]
+        S::trace_photons, // lights → Photon[n]
+        S::build_index,   // Photon[n] → tree over photons
+        S::gather,        // EyeVertex, tree → radiance[w·h]
+        S::accumulate,    // radiance → film
+    ];
+    for stage in order {
+        if !go_on() {
+            return Ok(false);
+        }
+        stage(stages, frame)?;
+    }
+    Ok(true)
 }

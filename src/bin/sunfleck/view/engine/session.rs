@@ -135,24 +135,12 @@ impl Session {
         Ok(())
     }
 
-    /// One iteration, its stages in the order of [`ppm::iterate`]; none if `is_stale` says between two of them that its
-    /// picture is not wanted any more.
+    /// One iteration; none if `is_stale` says between two stages that its picture is not wanted any more.
     pub fn iterate(&mut self, mut is_stale: impl FnMut() -> bool) -> Result<Option<Record>, Error> {
-        type Stage = fn(&mut dyn Stages, &sunfleck::layout::Frame) -> Result<(), Error>;
-        const STAGES: [Stage; 5] = [
-            |stages, frame| stages.trace_eye(frame),
-            |stages, frame| stages.trace_photons(frame),
-            |stages, frame| stages.build_index(frame),
-            |stages, frame| stages.gather(frame),
-            |stages, frame| stages.accumulate(frame),
-        ];
         let began = Instant::now();
         let frame = self.params.frame(self.n_iterations + 1);
-        for stage in STAGES {
-            if is_stale() {
-                return Ok(None);
-            }
-            stage(&mut *self.stages, &frame)?;
+        if !ppm::iterate_while(&mut *self.stages, &frame, || !is_stale())? {
+            return Ok(None);
         }
         let times = self.stages.times()?;
         self.n_iterations += 1;

@@ -5,7 +5,7 @@ use egui::{DragValue, Ui};
 use sunfleck::scene::settings::{CameraSettings, Settings};
 use sunfleck::scene::{Camera, Projection, Scene};
 
-use super::widgets::{Name, metres, row, slider};
+use super::widgets::{Name, metres, named, row, slider};
 use crate::view::app::Viewer;
 use crate::view::engine::Message;
 
@@ -119,12 +119,12 @@ fn place(ui: &mut Ui, viewer: &mut Viewer, camera: &Camera) {
         ui.spacing_mut().item_spacing.x = 2.0;
         let each = egui::vec2(((ui.available_width() - 4.0) / 3.0).max(20.0), ui.spacing().interact_size.y);
         let speed = f64::from(camera.focus_distance.abs()).clamp(1e-3, 1e3) * 0.005;
-        let mut drag = |value: &mut f32| {
+        let mut drag = |value: &mut f32, name: &str| {
             let drag = DragValue::new(value).speed(speed).range(-1e9..=1e9).update_while_editing(false);
-            ui.add_sized(each, drag.max_decimals(2))
+            named(ui.add_sized(each, drag.max_decimals(2)), name)
         };
         let [x, y, z] = &mut position;
-        let response = drag(x) | drag(y) | drag(z);
+        let response = drag(x, "x") | drag(y, "y") | drag(z, "z");
         changed = response.changed();
         response
     });

@@ -5,7 +5,7 @@ use egui::{DragValue, Ui};
 use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::settings::{Settings, Size};
 
-use super::widgets::{Name, choice, row, slider};
+use super::widgets::{Name, choice, named, row, slider};
 use crate::view::app::Viewer;
 
 const SIZE: Name = Name { name: "Size", hint: "Width and height of the picture, pixels. Restarts the estimate." };
@@ -14,7 +14,7 @@ const EXPOSURE: Name = Name {
     hint: "Stops (powers of two) that the picture is brightened by: found by itself, or given. Does not restart the \
            estimate.",
 };
-const STOPS: Name = Name { name: "", hint: "Exposure, stops. Does not restart the estimate." };
+const STOPS: Name = Name { name: "Stops", hint: "Exposure, stops. Does not restart the estimate." };
 const TONE: Name = Name {
     name: "Tone curve",
     hint: "How bright light is fitted into what a screen can show. Does not restart the estimate.",
@@ -65,9 +65,9 @@ fn size(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
         let each = egui::vec2(((ui.available_width() - 18.0) / 2.0).max(20.0), ui.spacing().interact_size.y);
         let [width, height] = &mut size;
         let drag = |side| DragValue::new(side).range(1..=MOST).speed(2.0).update_while_editing(false);
-        let mut response = ui.add_sized(each, drag(width));
+        let mut response = named(ui.add_sized(each, drag(width)), "Width");
         response |= ui.label("×");
-        response |= ui.add_sized(each, drag(height));
+        response |= named(ui.add_sized(each, drag(height)), "Height");
         if response.changed() {
             chosen = Some(size);
         }

@@ -78,6 +78,12 @@ pub fn slider(
     ui.add(adjust(slider))
 }
 
+/// One of several numbers in a row, which only the first takes its name from: says its own.
+pub fn named(response: Response, name: &str) -> Response {
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, name));
+    response
+}
+
 /// A length in metres, at least `least`; dragging changes it in proportion.
 pub fn metres(ui: &mut Ui, value: &mut f32, least: f32) -> Response {
     let speed = f64::from(value.abs()).max(1e-3) * 0.01;

@@ -328,7 +328,6 @@ fn convergence_is_plotted() {
 
 /// A screen reader finds every control.
 #[test]
-#[ignore = "five sliders and numbers of the panels have none yet"]
 fn every_control_has_a_name() {
     let mut window = Window::new(None);
     window.steps(3);
