@@ -1,6 +1,6 @@
 //! Sunfleck: progressive photon mapping, and the neighbour search under it.
 //!
-//! Import order, left never names right: `math` → `index` → `points` → `device` → `layout` → `scene` → `ppm` → `cpu` |
+//! Import order, left never names right: `math` → `index` → `points` → `mesh` → `device` → `layout` → `scene` → `ppm` → `cpu` |
 //! `gpu` → `inspect` → `output`. `cpu` and `gpu` do not know each other.
 
 #[cfg(feature = "render")]
@@ -13,6 +13,8 @@ pub mod index;
 pub mod inspect;
 pub mod layout;
 pub mod math;
+#[cfg(feature = "mesh")]
+pub mod mesh;
 #[cfg(feature = "render")]
 pub mod output;
 #[cfg(feature = "points")]

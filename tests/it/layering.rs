@@ -3,11 +3,12 @@
 use std::path::Path;
 
 /// Each module with those it may use.
-const ALLOWED: [(&str, &[&str]); 11] = [
+const ALLOWED: [(&str, &[&str]); 12] = [
     ("math", &[]),
     ("index", &["math"]),
     ("device", &["index"]),
     ("points", &["index", "math"]),
+    ("mesh", &["index", "math", "points"]),
     ("layout", &["index", "math"]),
     ("scene", &["layout", "index", "math"]),
     ("ppm", &["scene", "layout", "device", "index", "math"]),
