@@ -32,7 +32,7 @@ drag() { # with this button
 switch() { # to the scene of this number, on the start page as it is in a window of 1280 by 720
     local tries
     size 1280 720
-    for tries in 1 2 3 4 5 6; do
+    for tries in {1..30}; do
         xdotool windowfocus "$window" key Escape key ctrl+w
         sleep 1
         xdotool mousemove $((24 + 249 * $1 + 117)) 330 sleep 0.3 click 1

@@ -93,6 +93,8 @@ pub enum Phase {
 /// What was read.
 #[derive(Clone, Debug)]
 pub struct Opened {
+    /// What asked for it.
+    pub choice: Arc<Choice>,
     /// With the settings that it was opened with.
     pub source: Source,
     /// The settings as their file has them.
