@@ -131,7 +131,7 @@ impl<T: Scalar> KdTree<T> {
     /// Builds the whole tree.
     pub fn new(triangles: Triangles<T>, options: &KdOptions) -> Result<Self, Error> {
         options.sah.check()?;
-        let task = Task::new(&triangles, options.sah);
+        let task = Task::new(&triangles, options);
         let tree = Tree::build(task.root(options.builder), &task, options.parallel);
         Self::of(triangles, tree)
     }
