@@ -12,13 +12,13 @@ use clock::{Spent, Summary, clocked};
 use meshes::{Mesh, read, sphere};
 
 const HELP: &str = "\
-Options: --levels FROM..TO (5..7: spheres of 8·4^level faces)  --mesh FILE.obj  --rounds N (5)  --threads N (1)
+Options: --faces N,N,… (10000,32000,100000; spheres of about so many)  --mesh FILE.obj  --rounds N (5)  --threads N (1)
          --costs T,I (1,1)  --quadratic up to this many faces (2000)  --only TEXT of what is measured
 What is measured: builders, with the slope of their times; `speed-up` of a build by N threads; `rays`; `together`, rays
 and builds at once. Prints medians of milliseconds: of CPU, all threads together, and of the wall.";
 
 struct Options {
-    levels: (u32, u32),
+    faces: Vec<f64>,
     mesh: Option<String>,
     rounds: usize,
     threads: usize,
@@ -29,7 +29,7 @@ struct Options {
 
 fn main() {
     let mut options = Options {
-        levels: (5, 7),
+        faces: vec![10_000.0, 32_000.0, 100_000.0],
         mesh: None,
         rounds: 5,
         threads: 1,
@@ -43,10 +43,7 @@ fn main() {
         let wrong = || -> ! { panic!("{arg} {value}\n{HELP}") };
         let number = |text: &str| text.parse::<f64>().unwrap_or_else(|_| wrong());
         match arg.as_str() {
-            "--levels" => {
-                let (from, to) = value.split_once("..").unwrap_or_else(|| wrong());
-                options.levels = (number(from) as u32, number(to) as u32);
-            }
+            "--faces" => options.faces = value.split(',').map(number).collect(),
             "--mesh" => options.mesh = Some(value),
             "--rounds" => options.rounds = (number(&value) as usize).max(1),
             "--threads" => options.threads = (number(&value) as usize).max(1),
@@ -62,7 +59,7 @@ fn main() {
     }
     let meshes: Vec<Mesh> = match &options.mesh {
         Some(path) => vec![read(path)],
-        None => (options.levels.0..=options.levels.1).map(sphere).collect(),
+        None => options.faces.iter().map(|n| sphere((n / 8.0).sqrt().round().max(1.0) as i32)).collect(),
     };
     let mut growth = Vec::new();
     for (vertices, faces) in meshes {
@@ -128,6 +125,7 @@ fn measure(triangles: &Triangles<f64>, options: &Options, growth: &mut Vec<(Buil
         println!("  built lazily and a ray a face: {lazily}");
     }
     if options.wants("together") && parallel {
+        let rays = shuffled(rays);
         pool.install(|| together::together(triangles, &rays, options.sah, options.rounds));
     }
 }
@@ -150,8 +148,7 @@ fn speed_up(triangles: &Triangles<f64>, options: &Options) {
 /// The slope of a line through the logarithms of sizes and CPU times, for each builder.
 fn print_slopes(growth: &[(Builder, f64, f64)]) {
     for builder in [Builder::Quadratic, Builder::SortEachNode, Builder::SortOnce] {
-        let points: Vec<_> =
-            growth.iter().filter(|g| g.0 == builder).map(|&(_, n, cpu)| (n.ln(), cpu.ln())).collect();
+        let points: Vec<_> = growth.iter().filter(|g| g.0 == builder).map(|&(_, n, cpu)| (n.ln(), cpu.ln())).collect();
         if points.len() > 1 {
             let n = points.len() as f64;
             let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
@@ -162,24 +159,26 @@ fn print_slopes(growth: &[(Builder, f64, f64)]) {
     }
 }
 
-/// The mesh check's: from each face along its normal. In no order, as they would come from a queue.
+/// The mesh check's: from each face along its normal.
 fn rays(triangles: &Triangles<f64>) -> Vec<Ray<f64>> {
-    let n = triangles.len() as u64;
-    // A step without a factor in common with n visits all.
-    let gcd = |mut a: u64, mut b: u64| {
-        while b > 0 {
-            (a, b) = (b, a % b);
-        }
-        a
-    };
-    let step = (0..).map(|i| (n as f64 * 0.618) as u64 + i).find(|&step| gcd(step, n) == 1).unwrap_or(1);
-    (0..n)
-        .filter_map(|i| {
-            let [a, b, c] = triangles.corners((i * step % n) as u32);
+    (0..triangles.len() as u32)
+        .filter_map(|face| {
+            let [a, b, c] = triangles.corners(face);
             let minus = |p: [f64; 3], q: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| p[i] - q[i]) };
             let (u, v) = (minus(b, a), minus(c, a));
             let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
             Ray::new(std::array::from_fn(|i| (a[i] + b[i] + c[i]) / 3.0), normal).ok()
         })
         .collect()
+}
+
+/// In no order, as they would come from users.
+fn shuffled(mut rays: Vec<Ray<f64>>) -> Vec<Ray<f64>> {
+    let mut state = 1u64;
+    for i in (1..rays.len()).rev() {
+        // PCG's multiplier and increment; the upper bits are random enough.
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        rays.swap(i, (state >> 33) as usize % (i + 1));
+    }
+    rays
 }

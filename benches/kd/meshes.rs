@@ -23,42 +23,35 @@ pub fn read(path: &str) -> Mesh {
     mesh
 }
 
-/// An octahedron whose faces are split in four, `level` times: 8·4^level faces.
-pub fn sphere(level: u32) -> Mesh {
-    let mut vertices: Vec<[f64; 3]> = Vec::new();
-    for axis in 0..3 {
-        for sign in [1.0, -1.0] {
-            let mut p = [0.0; 3];
-            p[axis] = sign;
-            vertices.push(p);
+/// An octahedron whose edges are cut into `n` parts, blown up to a sphere: 8·n² faces, outward.
+pub fn sphere(n: i32) -> Mesh {
+    let mut mesh: Mesh = (Vec::new(), Vec::new());
+    let mut places = HashMap::new();
+    let mut vertex = |p: [i32; 3]| {
+        *places.entry(p).or_insert_with(|| {
+            let length = p.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>().sqrt();
+            let [x, y, z] = p.map(|x| f64::from(x) / length);
+            // Turned, so that no edge lies along an axis.
+            let (s, c) = 0.5f64.sin_cos();
+            let [x, y] = [c * x - s * y, s * x + c * y];
+            mesh.0.push([x, c * y - s * z, s * y + c * z]);
+            mesh.0.len() as u32 - 1
+        })
+    };
+    for octant in 0..8 {
+        let sign = [0, 1, 2].map(|axis| 1 - 2 * (octant >> axis & 1));
+        let mut at = |i: i32, j: i32| vertex([i * sign[0], j * sign[1], (n - i - j) * sign[2]]);
+        let mut face =
+            |[a, b, c]: [u32; 3]| mesh.1.push(if sign.iter().product::<i32>() > 0 { [a, b, c] } else { [a, c, b] });
+        for i in 0..n {
+            for j in 0..n - i {
+                let (a, b) = (at(i + 1, j), at(i, j + 1));
+                face([a, b, at(i, j)]);
+                if i + j + 2 <= n {
+                    face([a, at(i + 1, j + 1), b]);
+                }
+            }
         }
     }
-    let mut faces: Vec<[u32; 3]> = Vec::new();
-    for [x, y, z] in [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]] {
-        faces.push([x, y, z]);
-    }
-    for _ in 0..level {
-        let mut middles = HashMap::new();
-        let mut split = Vec::with_capacity(4 * faces.len());
-        for [a, b, c] in faces {
-            let [ab, bc, ca] = [(a, b), (b, c), (c, a)].map(|(a, b)| {
-                *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
-                    let sum: [f64; 3] = std::array::from_fn(|i| vertices[a as usize][i] + vertices[b as usize][i]);
-                    let length = sum.iter().map(|x| x * x).sum::<f64>().sqrt();
-                    vertices.push(sum.map(|x| x / length));
-                    vertices.len() as u32 - 1
-                })
-            });
-            split.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
-        }
-        faces = split;
-    }
-    // Turned, so that no edge lies along an axis.
-    for p in &mut vertices {
-        let (s, c) = 0.5f64.sin_cos();
-        let [x, y, z] = *p;
-        let [x, y] = [c * x - s * y, s * x + c * y];
-        *p = [x, c * y - s * z, s * y + c * z];
-    }
-    (vertices, faces)
+    mesh
 }

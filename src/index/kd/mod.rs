@@ -3,7 +3,7 @@
 //! Four builders ([`Builder`]) emit one [`KdTree`]; the three real ones emit the same tree, plane by plane. The build takes
 //! the surface area heuristic with split candidates from triangles clipped to the cell, and tries planar triangles on both
 //! sides (Wald & Havran 2006, "On building fast kd-Trees for Ray Tracing, and on doing that in O(N log N)"). [`LazyKd`]
-//! builds what rays reach. Queries ([`RaySearch`]) are watertight, in single or double precision.
+//! builds what rays reach, or grows beside them. Queries ([`RaySearch`]) are watertight, in single or double precision.
 //!
 //! # Precision
 //!

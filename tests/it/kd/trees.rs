@@ -87,7 +87,7 @@ fn builders_give_one_tree_of_an_icosphere() {
 #[test]
 #[ignore = "needs meshes, and a minute"]
 fn builders_give_one_tree_of_meshes_at_hand() {
-    const MOST: usize = 8000;
+    const MOST: usize = 20_000;
     let paths = std::env::var("SUNFLECK_MESHES").expect("SUNFLECK_MESHES names OBJ files");
     for path in paths.split_whitespace() {
         let (vertices, faces) = obj(&std::fs::read_to_string(path).unwrap());
