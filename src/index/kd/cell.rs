@@ -194,9 +194,11 @@ impl Halves {
             CUT => CUT,
             _ => place + counts[usize::from(place & ABOVE != 0)],
         }));
-        for half in 0..2 {
-            self.parts[half].extend_from_slice(&other.parts[half]);
-            self.cut[half].extend(other.cut[half].iter().map(|index| index + counts[half]));
+        for (half, other) in self.parts.iter_mut().zip(&other.parts) {
+            half.extend_from_slice(other);
+        }
+        for ((half, other), count) in self.cut.iter_mut().zip(&other.cut).zip(counts) {
+            half.extend(other.iter().map(|index| index + count));
         }
         self
     }
