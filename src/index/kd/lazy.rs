@@ -1,8 +1,8 @@
 //! A tree that grows where rays go, and beside them.
 //!
-//! A node is opened by the first who reaches it, a small one with all that is below it. Nobody waits for that: a ray that comes meanwhile
-//! tests the triangles of the cell instead, which takes less time than opening it, and goes on. What becomes of a node does not depend on
-//! who came first, so the tree, as far as it is grown, is that of the eager build.
+//! A node is opened by the first who reaches it, a small one with all that is below it. Nobody waits for that: a ray that
+//! comes meanwhile tests the triangles of the cell instead, which takes less time than opening it, and goes on. What
+//! becomes of a node does not depend on who came first, so the tree, as far as it is grown, is that of the eager build.
 //!
 //! Opening a node takes no part in rayon's pool. A thread that waits in the pool is given other work, which may be all the
 //! rays there are; the node that it was at would stay closed until they are through.

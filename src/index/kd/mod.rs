@@ -102,7 +102,7 @@ pub struct KdOptions {
     pub builder: Builder,
     /// What a split costs.
     pub sah: Sah,
-    /// Whether to build on all threads of rayon's pool: the same tree, too.
+    /// Whether to build, or to grow, on all threads of rayon's pool: the same tree, too.
     pub parallel: bool,
 }
 
