@@ -5,6 +5,7 @@
 //! than all of these together, and a ray visits both sides where it is that near. So every triangle that [`Ray::hit`]
 //! finds is found, and rays in a plane, along one or with zero components are no special case.
 
+use std::borrow::Borrow;
 use std::ops::ControlFlow;
 
 use super::{Hit, Ray, Scalar, Triangles};
@@ -12,7 +13,7 @@ use super::{Hit, Ray, Scalar, Triangles};
 /// How nodes are reached.
 pub trait Nodes: Copy {
     type Id: Copy;
-    type Items: AsRef<[u32]>;
+    type Items: IntoIterator<Item: Borrow<u32>>;
     fn root(self) -> Self::Id;
     fn open(self, node: Self::Id) -> Opened<Self::Id, Self::Items>;
 }
@@ -119,7 +120,8 @@ pub fn hits<T: Scalar, N: Nodes, B>(
                     }
                 }
                 Opened::Leaf(faces) => {
-                    for &face in faces.as_ref() {
+                    for face in faces {
+                        let face = *face.borrow();
                         if let Some(hit) = ray.hit(face, triangles.corners(face)) {
                             limit = visit(hit)?.into();
                         }
