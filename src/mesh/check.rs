@@ -9,7 +9,7 @@ use super::orientation::{Facing, by_rays};
 use super::overlaps::Overlaps;
 use super::topology::Topology;
 use super::{Error, Mesh};
-use crate::index::kd::{KdOptions, KdTree, LazyKd, Triangles};
+use crate::index::kd::{KdOptions, KdTree, LazyKd, Sah, Triangles};
 
 /// Pairs of intersecting faces that are listed, at most.
 const MAX_PAIRS: usize = 1 << 24;
@@ -26,9 +26,11 @@ pub struct CheckOptions {
 }
 
 impl Default for CheckOptions {
-    /// Everything, in parallel.
+    /// Everything, in parallel. One ray a face does not pay for the best tree: steps are said to cost four times what they
+    /// do, which makes the whole check faster.
     fn default() -> Self {
-        Self { kd: KdOptions { parallel: true, ..KdOptions::default() }, lazy: false, intersections: true }
+        let sah = Sah { traversal: 4.0, ..Sah::default() };
+        Self { kd: KdOptions { sah, parallel: true, ..KdOptions::default() }, lazy: false, intersections: true }
     }
 }
 
