@@ -2,7 +2,7 @@
 
 use super::{MAX_COORDINATE, Warnings};
 use crate::scene::Mesh;
-use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
+use glam::{DAffine3, DMat3, Vec2, Vec3, Vec4};
 
 /// Transforms a mesh with all its attributes. A mirror image keeps its front the front.
 pub(super) fn transform(mesh: &mut Mesh, world_from_mesh: &DAffine3) {
@@ -112,6 +112,7 @@ fn mend_normals(mesh: &mut Mesh, place: &str, warnings: &mut Warnings) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec3;
 
     #[test]
     fn a_mirror_keeps_the_front_in_front() {

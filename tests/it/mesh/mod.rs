@@ -1,8 +1,11 @@
 //! Triangle meshes: their check.
 
 mod faults;
+mod files;
 mod intersections;
 mod orientation;
+#[cfg(feature = "render")]
+mod program;
 
 use sunfleck::mesh::{CheckOptions, Mesh, Report};
 

@@ -1,5 +1,8 @@
 //! Which way normals point: exactly the faces that were flipped, at any unit and offset.
 
+use std::env;
+use std::path::PathBuf;
+
 use sunfleck::index::kd::{Builder, EveryTriangle, KdOptions, KdTree};
 use sunfleck::mesh::orientation::{Facing, by_rays};
 use sunfleck::mesh::{self, CheckOptions, Doubt, Mesh, Verdict};
@@ -166,4 +169,30 @@ fn contradictions_are_not_silent() {
     let report = mesh::check(&crossing, &options).unwrap();
     assert_eq!(report.verdict, Verdict::Unknown(Doubt::Disputed));
     assert!(!report.disputed.is_empty() && report.inward.is_empty());
+}
+
+/// Prints how many sets of flipped faces of a mesh were found, at each scale and offset. `SUNFLECK_MESH` names an OBJ file of
+/// triangles; without it the mesh is made by code.
+#[test]
+#[ignore = "minutes; see docs/testing.md"]
+fn a_hundred_sets_everywhere() {
+    let (mesh, name) = match env::var_os("SUNFLECK_MESH").map(PathBuf::from) {
+        Some(path) => (mesh::io::read(&path).unwrap().mesh, path.display().to_string()),
+        None => (bumpy(4, 7), "bumpy sphere".into()),
+    };
+    let size = mesh.vertices.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let n = mesh.faces.len();
+    let (mut n_sets, mut n_faces) = (0, 0);
+    for set in 0..100 {
+        let flipped = random_set(n, [0.5, 0.01, 0.9, 0.0001][set as usize % 4], set);
+        for exponent in -7..=7 {
+            let scale = 10.0f64.powi(exponent);
+            let sizes = if set % 2 == 0 { 0.0 } else { 10.0f64.powi(set as i32 % 7) };
+            flip_and_check(&placed(&mesh, scale, offset_of(sizes * size, scale, set)), &flipped);
+            (n_sets, n_faces) = (n_sets + 1, n_faces + flipped.len());
+        }
+    }
+    println!(
+        "{name}: {n} faces, 100 sets at 15 scales, offsets up to 1e6 sizes: {n_sets} of {n_sets} exact, {n_faces} faces"
+    );
 }
