@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::crossings::{are_collinear, intersect};
 use super::orientation::{Facing, by_rays};
 use super::overlaps::Overlaps;
+use super::report::{Doubt, Report, Shell, Verdict};
 use super::topology::Topology;
 use super::{Error, Mesh};
 use crate::index::kd::{KdOptions, KdTree, LazyKd, Sah, Triangles};
@@ -31,111 +32,6 @@ impl Default for CheckOptions {
     fn default() -> Self {
         let sah = Sah { traversal: 4.0, ..Sah::default() };
         Self { kd: KdOptions { sah, parallel: true, ..KdOptions::default() }, lazy: false, intersections: true }
-    }
-}
-
-/// Which way the normals point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// All out of the solid.
-    Outward,
-    /// All into it.
-    Inward,
-    /// Those of [`Report::inward`] into it.
-    Mixed,
-    /// There is no telling.
-    Unknown(Doubt),
-}
-
-/// Why there is no telling which way normals point. The first that holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Doubt {
-    /// There is no face with three different corners.
-    Empty,
-    /// An edge has an odd number of faces: nothing is inside.
-    Open,
-    /// Faces intersect.
-    Intersecting,
-    /// A shell has only one side.
-    OneSided,
-    /// A shell has no face that rays decide on: it coincides with another, or is smaller than rounding.
-    Undecided,
-    /// Rays from faces of one shell contradict each other: those of [`Report::disputed`] the others.
-    Disputed,
-}
-
-/// Faces joined across edges that exactly two share.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Shell {
-    /// The lowest.
-    pub first_face: u32,
-    /// Number of faces.
-    pub faces: usize,
-    /// Which way they point; none if there is no telling, or that was not asked.
-    pub facing: Option<Facing>,
-    /// Faces that point the other way than most; of the first half if as many do.
-    pub minority: usize,
-}
-
-/// What is known of a mesh. Faces and vertices are numbers of the mesh as given, each list in rising order; an edge is its two
-/// vertices, the lower first.
-///
-/// Vertices in exactly the same place are taken for one, and named by the first of them.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Report {
-    /// Number of vertices, as given.
-    pub vertices: usize,
-    /// Number of faces, as given.
-    pub faces: usize,
-    /// Vertices in the place of one before them.
-    pub merged_vertices: usize,
-    /// Vertices that no face has.
-    pub unused_vertices: usize,
-    /// Faces of no area: exactly.
-    pub degenerate: Vec<u32>,
-    /// Faces with the same three vertices as one before: both, that one second.
-    pub duplicates: Vec<[u32; 2]>,
-    /// Edges with one face, or another odd number.
-    pub open_edges: Vec<[u32; 2]>,
-    /// Edges with more than two faces.
-    pub crowded_edges: Vec<[u32; 2]>,
-    /// Vertices around which faces do not form a single fan.
-    pub pinched_vertices: Vec<u32>,
-    /// Edges along which faces run the same way: the normals on the two sides contradict each other.
-    pub clashing_edges: Vec<[u32; 2]>,
-    /// Pairs of faces that have more in common than the vertices they share: exactly. Faces of no area are left out.
-    pub intersections: Vec<[u32; 2]>,
-    /// In the order of their first faces.
-    pub shells: Vec<Shell>,
-    /// Shells with one side, by first face.
-    pub one_sided: Vec<u32>,
-    /// Which way the normals point.
-    pub verdict: Verdict,
-    /// Faces whose normals point inward; empty if there is no telling.
-    pub inward: Vec<u32>,
-    /// Faces whose rays contradict most of their shell's.
-    pub disputed: Vec<u32>,
-}
-
-impl Report {
-    /// Whether the surface parts inside from outside.
-    pub fn is_closed(&self) -> bool {
-        self.open_edges.is_empty() && !self.shells.is_empty()
-    }
-
-    /// Whether the surface looks like a plane everywhere, or like the edge of one.
-    pub fn is_manifold(&self) -> bool {
-        self.crowded_edges.is_empty() && self.pinched_vertices.is_empty()
-    }
-
-    /// Whether there is nothing to say against the mesh: closed, manifold, outward, and no face that is degenerate, a
-    /// duplicate, or intersects another.
-    pub fn is_clean(&self) -> bool {
-        self.verdict == Verdict::Outward
-            && self.is_manifold()
-            && self.degenerate.is_empty()
-            && self.duplicates.is_empty()
-            && self.intersections.is_empty()
     }
 }
 
@@ -188,7 +84,7 @@ pub fn check(mesh: &Mesh, options: &CheckOptions) -> Result<Report, Error> {
         report.disputed = shells.vote(&facings);
         if !report.disputed.is_empty() {
             Some(Doubt::Disputed)
-        } else if shells.members.iter().any(|shell| shell.root_faces.is_none()) {
+        } else if shells.members.iter().any(|shell| shell.first_facing.is_none()) {
             Some(Doubt::Undecided)
         } else {
             None
@@ -302,8 +198,8 @@ impl Merged {
 
 struct Member {
     faces: Vec<u32>,
-    /// Whether the first face points inward, once known.
-    root_faces: Option<Facing>,
+    /// Which way the first face points, once known.
+    first_facing: Option<Facing>,
 }
 
 /// The shells, and how their faces run.
@@ -319,7 +215,7 @@ impl<'a> Shells<'a> {
         for face in faces {
             let at = *place.entry(shell[face]).or_insert(members.len());
             if at == members.len() {
-                members.push(Member { faces: Vec::new(), root_faces: None });
+                members.push(Member { faces: Vec::new(), first_facing: None });
             }
             members[at].faces.push(face as u32);
         }
@@ -344,7 +240,7 @@ impl<'a> Shells<'a> {
             };
             let count = |facing| shell.faces.iter().filter(|&&face| says(face, facing)).count();
             let (outward, inward) = (count(Facing::Outward), count(Facing::Inward));
-            shell.root_faces = match () {
+            shell.first_facing = match () {
                 () if outward == 0 && inward == 0 => None,
                 () if outward >= inward => Some(Facing::Outward),
                 () => Some(Facing::Inward),
@@ -364,7 +260,7 @@ impl<'a> Shells<'a> {
             let against = shell.faces.iter().filter(|&&face| self.against[face as usize]).count();
             let minority = against.min(shell.faces.len() - against);
             let most_against = 2 * against > shell.faces.len();
-            let facing = shell.root_faces.filter(|_| is_known);
+            let facing = shell.first_facing.filter(|_| is_known);
             if let Some(first) = facing {
                 let is_inward = |face: &u32| (first == Facing::Inward) != self.against[*face as usize];
                 inward.extend(shell.faces.iter().copied().filter(is_inward));

@@ -19,9 +19,11 @@ mod crossings;
 pub mod io;
 pub mod orientation;
 mod overlaps;
+mod report;
 mod topology;
 
-pub use check::{CheckOptions, Doubt, Report, Shell, Verdict, check};
+pub use check::{CheckOptions, check};
+pub use report::{Doubt, Report, Shell, Verdict};
 
 use std::path::PathBuf;
 
