@@ -257,7 +257,7 @@ fn resting(wanted: &Wanted) -> Phase {
 }
 
 /// Reads a scene and the settings that lie beside it.
-fn open(choice: &Choice) -> Result<Opened> {
+fn open(choice: &Arc<Choice>) -> Result<Opened> {
     let mut source = Source::resolve(&choice.name)?;
     let read = source.settings.clone();
     for pair in &choice.set {
@@ -265,7 +265,7 @@ fn open(choice: &Choice) -> Result<Opened> {
     }
     source.locate();
     let loaded = source.scene()?;
-    Ok(Opened { source, read, loaded })
+    Ok(Opened { choice: Arc::clone(choice), source, read, loaded })
 }
 
 /// Those settings that the estimate depends on.
