@@ -55,7 +55,7 @@ pub fn check(mesh: &Mesh, options: &CheckOptions) -> Result<Report, Error> {
         vertices: mesh.vertices.len(),
         faces: mesh.faces.len(),
         merged_vertices: solid.n_merged,
-        unused_vertices: unused(mesh),
+        unused_vertices: solid.n_unused,
         degenerate: (0..).zip(&degenerate).filter(|(_, is)| **is).map(|(face, _)| face).collect(),
         duplicates: solid.duplicates(),
         open_edges: topology.open,
@@ -104,12 +104,6 @@ fn has_three([a, b, c]: [u32; 3]) -> bool {
     a != b && b != c && c != a
 }
 
-fn unused(mesh: &Mesh) -> usize {
-    let mut is_used = vec![false; mesh.vertices.len()];
-    mesh.faces.iter().flatten().for_each(|&v| is_used[v as usize] = true);
-    is_used.iter().filter(|is| !**is).count()
-}
-
 /// A mesh whose vertices in the same place are one, of coordinates near 1.
 struct Merged {
     /// Scaled by a power of two: as exact as they were.
@@ -117,6 +111,7 @@ struct Merged {
     /// By the first vertex in each place.
     faces: Vec<[u32; 3]>,
     n_merged: usize,
+    n_unused: usize,
 }
 
 impl Merged {
@@ -127,13 +122,22 @@ impl Merged {
             // −0 is 0.
             .map(|(i, p)| *first.entry(p.map(|x| (x + 0.0).to_bits())).or_insert(i))
             .collect();
-        let used = || mesh.faces.iter().flatten().map(|&v| mesh.vertices[v as usize]);
+        let mut is_used = vec![false; mesh.vertices.len()];
+        mesh.faces.iter().flatten().for_each(|&v| is_used[v as usize] = true);
+        let used = || mesh.vertices.iter().zip(&is_used).filter(|(_, is)| **is).map(|(p, _)| *p);
         let greatest = used().fold(0.0, |m: f64, p| m.max(super::largest(p)));
         let scale = if greatest > 0.0 { 2.0f64.powi(-(greatest.log2() as i32).clamp(-1000, 1000)) } else { 1.0 };
         Self {
-            vertices: mesh.vertices.iter().map(|p| p.map(|x| x * scale)).collect(),
+            // The others may lie anywhere.
+            vertices: mesh
+                .vertices
+                .iter()
+                .zip(&is_used)
+                .map(|(p, is)| p.map(|x| if *is { x * scale } else { 0.0 }))
+                .collect(),
             faces: mesh.faces.iter().map(|corners| corners.map(|v| merged[v as usize])).collect(),
             n_merged: mesh.vertices.len() - first.len(),
+            n_unused: is_used.iter().filter(|is| !**is).count(),
         }
     }
 

@@ -129,6 +129,14 @@ fn faces_given_twice() {
 }
 
 #[test]
+fn vertices_of_no_face_do_not_matter() {
+    let mut mesh = placed(&bumpy(1, 3), 1e-80, [0.0; 3]);
+    mesh.vertices.push([1e89; 3]);
+    let report = check(&mesh);
+    assert_eq!((report.unused_vertices, report.verdict), (1, Verdict::Outward));
+}
+
+#[test]
 fn what_is_no_mesh_is_refused() {
     let broken = |mesh: Mesh| mesh::check(&mesh, &CheckOptions::default()).unwrap_err();
     let mut mesh = tetrahedron();

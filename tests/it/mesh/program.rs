@@ -133,7 +133,7 @@ fn json_counts_the_faces_of_the_file() {
     assert_eq!((&json["normals"], &json["doubt"], &json["clean"]), (&"mixed".into(), &Value::Null, &false.into()));
     assert_eq!((&json["closed"], &json["manifold"]), (&true.into(), &true.into()));
     assert_eq!(json["shells"][0]["facing"], "outward");
-    assert_eq!(json["clashing_edges"].as_array().unwrap().len(), 7);
+    assert_eq!(json["clashing_edges"].as_array().unwrap().len(), 6);
     for list in
         ["disputed", "degenerate", "duplicates", "intersections", "open_edges", "crowded_edges", "pinched_vertices"]
     {

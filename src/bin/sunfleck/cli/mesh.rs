@@ -5,19 +5,21 @@ use std::path::PathBuf;
 use clap::Args;
 
 const HELP: &str = "\
-Normals are judged where the mesh is closed and no faces intersect: by a ray from each face, which must agree with the way
-neighbouring faces run along their edges. Nothing depends on the unit of length. Vertices in exactly the same place are one.
-Faces and vertices are counted from 0, in the order of the file; an OBJ's own indices are one more.
+Normals are judged where the mesh is closed and no faces intersect: by a ray from each face, which
+must agree with the way that neighbours run along their common edge. Nothing depends on the unit of
+length. Vertices in exactly the same place are one. Faces and vertices are counted from 0, in the
+order of the file; an OBJ's own indices are one more.
 
-Read are .obj, .ply, .stl, .off, .gltf, .glb, and .node with .face beside it (TetGen); written are .obj, .ply, .stl and .off.
+Read are .obj, .ply, .stl, .off, .gltf, .glb, and .node with .face beside it (TetGen); written are
+.obj, .ply, .stl (in single precision) and .off.
 
 Examples:
   sunfleck mesh-check eros.obj
   sunfleck mesh-check scan.ply --json
   sunfleck mesh-check part.stl --fix -o fixed.obj
 
-Exit codes: 0 closed, manifold, all normals outward, no degenerate, duplicate or intersecting faces (with --fix: the mesh
-written is); 1 not so, or an error; 2 wrong usage.";
+Exit codes: 0 closed, manifold, all normals outward, no degenerate, duplicate or intersecting faces
+(with --fix: so is what was written); 1 not so, or an error; 2 wrong usage.";
 
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
