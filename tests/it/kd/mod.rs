@@ -1,7 +1,7 @@
 //! kd-trees over triangles.
 
 mod growing;
-mod meshes;
+pub mod meshes;
 mod queries;
 mod trees;
 mod watertight;
