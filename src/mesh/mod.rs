@@ -2,6 +2,10 @@
 //!
 //! Double precision throughout: the answers do not depend on the unit of length, or on where the mesh lies.
 
+mod collapse;
+pub mod generate;
+pub mod resize;
+
 use crate::index::kd;
 
 /// Vertices, and three of them for each face, anticlockwise as seen from where its normal (b − a) × (c − a) points to.

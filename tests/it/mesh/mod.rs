@@ -1,0 +1,3 @@
+//! Triangle meshes: made, split and simplified.
+
+mod generate;
