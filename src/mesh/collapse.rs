@@ -14,7 +14,7 @@ const PULL: f64 = 1e-4;
 const TURN: f64 = 0.3;
 
 /// Σ area² of faces × squared distance to their planes: xᵀ·matrix·x + 2·vector·x + constant.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Quadric {
     matrix: DMat3,
     vector: DVec3,
@@ -22,6 +22,8 @@ struct Quadric {
 }
 
 impl Quadric {
+    const ZERO: Self = Self { matrix: DMat3::ZERO, vector: DVec3::ZERO, constant: 0.0 };
+
     /// Of the plane of a face.
     fn of([a, b, c]: [DVec3; 3]) -> Self {
         let normal = (b - a).cross(c - a);
@@ -65,10 +67,12 @@ pub(super) struct Collapse {
     gone: Vec<bool>,
     left: usize,
     cheapest: BinaryHeap<Entry>,
+    /// Faces that look away from here go on to do so.
+    middle: Option<DVec3>,
 }
 
 impl Collapse {
-    pub(super) fn new(mesh: &Mesh) -> Self {
+    pub(super) fn new(mesh: &Mesh, middle: Option<DVec3>) -> Self {
         let Mesh { vertices, faces } = mesh.clone();
         let n = vertices.len();
         let (gone, left) = (vec![false; faces.len()], faces.len());
@@ -78,13 +82,14 @@ impl Collapse {
             vertices,
             faces,
             stars,
-            quadrics: vec![Quadric::default(); n],
+            quadrics: vec![Quadric::ZERO; n],
             centre,
             moves: vec![0; n],
             fixed: vec![false; n],
             gone,
             left,
             cheapest: BinaryHeap::new(),
+            middle: middle.map(|p| p - centre),
         };
         for face in 0..new.faces.len() {
             let quadric = Quadric::of(new.faces[face].map(|v| new.place(v)));
@@ -237,6 +242,7 @@ impl Collapse {
             let least = TURN * before.length() * after.length();
             // One without area may get some.
             before != DVec3::ZERO && (after == DVec3::ZERO || before.dot(after) < least)
+                || self.middle.is_some_and(|middle| (to - middle).dot(after) <= 0.0)
         })
     }
 

@@ -3,7 +3,8 @@
 use glam::DVec3;
 
 use super::Mesh;
-use super::resize::{quarter, resize};
+use super::collapse::Collapse;
+use super::resize::{quarter, subdivide};
 use crate::math::rng::pcg4d;
 
 /// Faces of the mesh of Eros that the literature scales.
@@ -45,18 +46,24 @@ pub fn icosphere(level: u32) -> Mesh {
     mesh
 }
 
-/// A bumpy, elongated body with craters, some 34 long and 12 across (kilometres, as Eros), at least 60 faces.
+/// A bumpy, elongated body with craters, some 34 long and 12 across (kilometres, as Eros), at least 300 faces.
 ///
-/// Made with [`EROS_FACES`], then split or simplified ([`resize`]): every size is of the same shape. An odd number becomes
-/// the next even one, for a closed mesh has no other. Each ray from the origin meets the surface once, so that it does not
-/// intersect itself.
+/// Made with [`EROS_FACES`], then split or simplified as by [`resize`](super::resize::resize): every size is of the same shape.
+/// An odd number becomes the next even one, for a closed mesh has no other. Each ray from the origin meets the surface once,
+/// so it does not intersect itself.
 pub fn asteroid(n_faces: usize, seed: u32) -> Mesh {
     let mut mesh = icosphere(6);
     let relief = Relief::new(seed);
     for p in &mut mesh.vertices {
         *p = relief.place(DVec3::from(*p)).to_array();
     }
-    resize(&resize(&mesh, EROS_FACES), n_faces.max(60))
+    let simplify = |mesh: &Mesh, n: usize| {
+        let mut collapse = Collapse::new(mesh, Some(DVec3::ZERO));
+        collapse.run(n);
+        collapse.finish()
+    };
+    let base = simplify(&mesh, EROS_FACES);
+    if n_faces < EROS_FACES { simplify(&base, n_faces.max(300)) } else { subdivide(&base, n_faces) }
 }
 
 /// Half the axes.

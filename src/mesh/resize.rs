@@ -60,7 +60,7 @@ pub fn subdivide(mesh: &Mesh, n_faces: usize) -> Mesh {
 /// `n_faces` is odd and the mesh closed. It stays as closed and as manifold as it was, with all its holes and handles; where
 /// this forbids going on there are more faces than asked. Vertices at a rim stay. Indices must be in range.
 pub fn decimate(mesh: &Mesh, n_faces: usize) -> Mesh {
-    let mut collapse = Collapse::new(mesh);
+    let mut collapse = Collapse::new(mesh, None);
     collapse.run(n_faces);
     collapse.finish()
 }
