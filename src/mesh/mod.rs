@@ -18,12 +18,15 @@ mod check;
 mod collapse;
 mod crossings;
 pub mod generate;
+pub mod io;
 pub mod orientation;
 mod overlaps;
 pub mod resize;
 mod topology;
 
 pub use check::{CheckOptions, Doubt, Report, Shell, Verdict, check};
+
+use std::path::PathBuf;
 
 use crate::index::kd;
 
@@ -42,6 +45,14 @@ pub enum Error {
     /// An index out of range, a coordinate that is not finite or too large, or too many faces.
     #[error(transparent)]
     Mesh(#[from] kd::Error),
+    /// A file cannot be read, or is not what its name says.
+    #[error("{}: {problem}", path.display())]
+    File {
+        /// As given, or the one beside it.
+        path: PathBuf,
+        /// In words, with the line, the vertex or the face.
+        problem: String,
+    },
     /// So many pairs that listing them helps nobody.
     #[error("more than {0} pairs of faces intersect: this is not a surface")]
     Tangled(usize),

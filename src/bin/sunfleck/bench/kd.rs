@@ -55,7 +55,7 @@ pub struct KdArgs {
     #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(0..=9))]
     levels: Vec<u32>,
 
-    /// Scale this mesh in place of the asteroid: .obj, .ply, .stl, …
+    /// Scale this mesh in place of the asteroid: .obj, .ply, .stl, .off, or TetGen's .node or .face
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
 
@@ -210,18 +210,7 @@ pub fn run(args: &KdArgs) -> Result<()> {
 }
 
 fn read(path: &std::path::Path) -> Result<Mesh> {
-    let text = std::fs::read_to_string(path)?;
-    let mut mesh = Mesh::default();
-    for line in text.lines() {
-        let mut w = line.split_whitespace();
-        match w.next() {
-            Some("v") => mesh.vertices.push([(); 3].map(|()| w.next().unwrap().parse().unwrap())),
-            Some("f") => mesh
-                .faces
-                .push([(); 3].map(|()| w.next().unwrap().split('/').next().unwrap().parse::<u32>().unwrap() - 1)),
-            _ => {}
-        }
-    }
+    let mesh = sunfleck::mesh::io::read(path)?.mesh;
     ensure!(!mesh.faces.is_empty(), "{}: there are no faces", path.display());
     mesh.triangles().with_context(|| path.display().to_string())?;
     Ok(mesh)
