@@ -82,6 +82,11 @@ const CURVES: [Figure; 6] = [
 /// Busy threads.
 const FIGURE_7: &str = "7.7";
 
+/// Of [`Cell::ms`].
+fn unit(is_parallel: bool) -> &'static str {
+    if cfg!(unix) && !is_parallel { "ms of CPU" } else { "ms" }
+}
+
 fn title(figure: &str, mesh: &str, is_parallel: bool) -> String {
     format!("Figure {figure}: {mesh}, {}", if is_parallel { "all threads" } else { "one thread" })
 }
@@ -109,7 +114,7 @@ fn curves(panel: &Panel, mesh: &str, is_parallel: bool, cells: &[Cell]) -> Curve
     Curves {
         title: panel.title.to_owned(),
         x: "faces",
-        y: "ms",
+        y: unit(is_parallel),
         series: series.filter(|s| !s.points.is_empty()).collect(),
     }
 }
@@ -146,7 +151,8 @@ pub fn print(machine: &Machine, mesh: &str, cells: &[Cell], left_out: Option<&st
         let mesh = if is_sphere { SPHERE } else { mesh };
         for &i in which {
             let table = table(figure, &panels[i], mesh, is_parallel, cells);
-            crate::print(&format!("\n{}: {}, wall ms.\n{table}", title(figure, mesh, is_parallel), panels[i].title));
+            let (title, unit) = (title(figure, mesh, is_parallel), unit(is_parallel));
+            crate::print(&format!("\n{title}: {}, {unit}.\n{table}", panels[i].title));
         }
         crate::print(thesis::claim(figure));
         if figure == "7.6" {

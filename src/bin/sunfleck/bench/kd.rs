@@ -13,6 +13,7 @@
 //! - The O(N²) builder of the thesis tries one axis a node; ours all three, so that all builders give one tree.
 //! - A ray that comes too near to an edge is cast again, so there are somewhat more rays than faces.
 //! - Rays go where the check's do, through a tree of the check's own costs.
+//! - Times on one thread are CPU times, where the system tells them: other work on the machine does not lengthen them.
 
 use std::path::PathBuf;
 
@@ -116,8 +117,11 @@ pub struct Cell {
 }
 
 impl Cell {
+    /// Milliseconds: of CPU on one thread, where the system tells them, for other work does not lengthen them; else of the
+    /// wall.
     pub fn ms(&self) -> f64 {
-        1e3 * self.times.wall().median
+        let cpu = self.times.cpu().filter(|_| !self.is_parallel);
+        1e3 * cpu.unwrap_or_else(|| self.times.wall()).median
     }
 
     /// Share of the threads' time that was spent computing, 0 to 1.
