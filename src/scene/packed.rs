@@ -4,7 +4,8 @@ use glam::{Vec2, Vec3, Vec3A, Vec4};
 use half::f16;
 use obvhs::aabb::Aabb;
 
-use super::{AlphaMode, PunctualKind, Scene, Texture, Wrap, albedo, bvh, environment};
+use super::{Accelerator, AlphaMode, PunctualKind, Scene, SceneKd, Texture, Wrap, albedo, bvh, environment};
+use crate::index::kd;
 use crate::layout::{self, NONE, Primitive, SceneInfo, SceneNode, TextureSlot, Vertex};
 
 /// Flat arrays and the tree over the primitives, in leaf order.
@@ -32,6 +33,8 @@ pub struct PackedScene {
     pub environment_rows: Vec<f32>,
     /// Directional albedo of the GGX lobe ([`albedo`]).
     pub albedo: Vec<[f32; 2]>,
+    /// What the CPU goes by instead of `nodes`, if it is there.
+    pub kd: Option<SceneKd>,
 }
 
 impl PackedScene {
@@ -55,6 +58,20 @@ impl PackedScene {
         packed.info.epsilon = 4e-6;
         packed.pack_lights(scene);
         packed
+    }
+
+    /// With another accelerator for the CPU; a GPU does not mind. Fails as [`SceneKd::new`] does.
+    pub fn accelerated(mut self, by: Accelerator) -> Result<Self, kd::Error> {
+        self.kd = match by {
+            Accelerator::Bvh => None,
+            Accelerator::Kd => Some(SceneKd::new(&self.primitives)?),
+        };
+        Ok(self)
+    }
+
+    /// What the CPU goes by.
+    pub fn accelerator(&self) -> Accelerator {
+        if self.kd.is_some() { Accelerator::Kd } else { Accelerator::Bvh }
     }
 
     fn pack_images(&mut self, scene: &Scene) {
@@ -304,7 +321,7 @@ fn pack_halves(a: f32, b: f32) -> u32 {
     u32::from(f16::from_f32(a).to_bits()) | u32::from(f16::from_f32(b).to_bits()) << 16
 }
 
-fn primitive_box(p: &Primitive) -> Aabb {
+pub(super) fn primitive_box(p: &Primitive) -> Aabb {
     let (a, b, c) = (Vec3A::from(p.a), Vec3A::from(p.b), Vec3A::from(p.c));
     if p.flags & layout::PRIMITIVE_SPHERE != 0 {
         // A little larger: the surface that intersection finds is rounded.

@@ -92,7 +92,7 @@ pub struct Session {
 
 impl Session {
     pub fn new(device: &Device, opened: Arc<Opened>, settings: Arc<Settings>, input: Input) -> Result<Self> {
-        let scene = Arc::new(PackedScene::new(&input.scene));
+        let scene = device.pack(&input.scene)?;
         let stages = device.stages_of(Arc::clone(&scene), &input, Some(DISPATCH_SECONDS))?;
         let params = input.params.clone();
         Ok(Self {
