@@ -8,42 +8,14 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 folder="${1:-renders}"
 
-missing=()
-for tool in Xvfb xdotool import convert; do
-    command -v "$tool" >/dev/null || missing+=("$tool")
-done
-if ((${#missing[@]})); then
-    echo "renders/viewer.sh: missing: ${missing[*]} (Debian: xvfb xdotool imagemagick)" >&2
-    exit 1
-fi
+. tests/display.sh
+need Xvfb xdotool import convert
 program="${SUNFLECK:-target/release/sunfleck}"
 [[ -x "$program" ]] || cargo build --release
 
-work="$(mktemp -d)"
-pids=()
-end() {
-    for pid in "${pids[@]}"; do kill "$pid" 2>/dev/null || true; done
-    wait 2>/dev/null || true
-    rm -rf "$work"
-}
-trap end EXIT
-
-Xvfb -displayfd 3 -screen 0 1600x900x24 -nolisten tcp 3>"$work/display" 2>/dev/null &
-pids+=($!)
-until [[ -s "$work/display" ]]; do sleep 0.1; done
-DISPLAY=":$(<"$work/display")"
-export DISPLAY XDG_DATA_HOME="$work" XDG_CONFIG_HOME="$work"
-unset WAYLAND_DISPLAY
-
-viewer= window=
-open() { # starts the program with these arguments; its window has the whole screen
-    "$program" view "$@" 2>"$work/stderr" &
-    viewer=$!
-    pids+=("$viewer")
-    until window="$(xdotool search --onlyvisible --name Sunfleck 2>/dev/null | tail -n 1)" && [[ -n "$window" ]]; do
-        kill -0 "$viewer" || { cat "$work/stderr" >&2; exit 1; }
-        sleep 0.2
-    done
+start_display 1600x900
+show() { # the program with these arguments, as large as the screen
+    open "$@"
     xdotool windowmove "$window" 0 0 windowsize "$window" 1600 900 windowfocus "$window"
 }
 wait_for() { # until the window says that it has done so many iterations
@@ -76,11 +48,11 @@ close() {
     wait "$viewer"
 }
 
-open
+show
 shot start
 close
 
-open glass --set size=960x540 --set photons=200k --iterations 300
+show glass --set size=960x540 --set photons=200k --iterations 300
 wait_for 300
 shot caustic
 # Photons over the picture: by power, then by bounce.
@@ -92,7 +64,7 @@ close
 
 # What few iterations have found beside what many have.
 "$program" render glass --set size=960x540 --set photons=200k --iterations 300 -q -o "$work/reference.exr"
-open glass --set size=960x540 --set photons=200k --iterations 4 --reference "$work/reference.exr"
+show glass --set size=960x540 --set photons=200k --iterations 4 --reference "$work/reference.exr"
 wait_for 4
 keys c
 shot compare

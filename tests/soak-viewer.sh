@@ -7,34 +7,13 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 minutes="${1:-60}"
 program="${2:-target/release/sunfleck}"
-for tool in Xvfb xdotool; do
-    command -v "$tool" >/dev/null || { echo "soak-viewer: $tool is missing" >&2; exit 1; }
-done
+. tests/display.sh
+need Xvfb xdotool
 [[ -x "$program" ]] || { echo "soak-viewer: no $program: cargo build --release" >&2; exit 1; }
 
-work="$(mktemp -d)"
-pids=()
-end() {
-    for pid in "${pids[@]}"; do kill "$pid" 2>/dev/null || true; done
-    wait 2>/dev/null || true
-    rm -rf "$work"
-}
-trap end EXIT
-Xvfb -displayfd 3 -screen 0 1920x1080x24 -nolisten tcp 3>"$work/display" 2>/dev/null &
-pids+=($!)
-until [[ -s "$work/display" ]]; do sleep 0.1; done
-DISPLAY=":$(<"$work/display")"
-export DISPLAY XDG_DATA_HOME="$work" XDG_CONFIG_HOME="$work"
-unset WAYLAND_DISPLAY
-
-"$program" view --backend gpu 2>"$work/stderr" &
-viewer=$!
-pids+=("$viewer")
+start_display 1920x1080
 alive() { kill -0 "$viewer" 2>/dev/null; }
-until window="$(xdotool search --onlyvisible --name Sunfleck 2>/dev/null | tail -n 1)" && [[ -n "$window" ]]; do
-    alive || { cat "$work/stderr" >&2; exit 1; }
-    sleep 0.2
-done
+open --backend gpu
 
 scenes=(cornell glass pool bathroom fireplace)
 keys=(e shift+e x t space n f plus minus minus v shift+v g F1 F2 F3 F3 1 2 3 question Escape ctrl+z ctrl+y c)
@@ -53,7 +32,7 @@ drag() { # with this button
 switch() { # to the scene of this number, on the start page as it is in a window of 1280 by 720
     local tries
     size 1280 720
-    for tries in 1 2 3 4 5 6; do
+    for tries in {1..30}; do
         xdotool windowfocus "$window" key Escape key ctrl+w
         sleep 1
         xdotool mousemove $((24 + 249 * $1 + 117)) 330 sleep 0.3 click 1

@@ -134,18 +134,32 @@ impl Params {
 
 /// Chooses the first radii, tells the backend and returns them, metres, `[h·w]`. Call before the first [`iterate`].
 pub fn start<S: Stages + ?Sized>(stages: &mut S, params: &Params) -> Result<Vec<f32>, Error> {
+    Ok(start_while(stages, params, || true)?.expect("nothing stops it"))
+}
+
+/// The same as long as `go_on`, which is asked before every stage; none if it stopped.
+pub fn start_while<S: Stages + ?Sized>(
+    stages: &mut S,
+    params: &Params,
+    mut go_on: impl FnMut() -> bool,
+) -> Result<Option<Vec<f32>>, Error> {
     let [width, height] = params.film_size();
     let radii = match params.radius {
         FirstRadius::Fixed(r) => vec![r; (width * height) as usize],
         FirstRadius::Automatic => {
             let pilot = params.frame(0);
-            stages.trace_eye(&pilot)?;
-            stages.trace_photons(&pilot)?;
-            first_radii(&pilot, &stages.camera(), &stages.eye_vertices()?, &stages.photons()?)
+            if !run(stages, &pilot, &[S::trace_eye, S::trace_photons], &mut go_on)? {
+                return Ok(None);
+            }
+            let (eye, photons) = (stages.eye_vertices()?, stages.photons()?);
+            if !go_on() {
+                return Ok(None);
+            }
+            first_radii(&pilot, &stages.camera(), &eye, &photons)
         }
     };
     stages.set_first_radii(&radii)?;
-    Ok(radii)
+    Ok(Some(radii))
 }
 
 /// One iteration: the algorithm on one screen.
@@ -157,9 +171,8 @@ pub fn iterate<S: Stages + ?Sized>(stages: &mut S, frame: &layout::Frame) -> Res
 pub fn iterate_while<S: Stages + ?Sized>(
     stages: &mut S,
     frame: &layout::Frame,
-    mut go_on: impl FnMut() -> bool,
+    go_on: impl FnMut() -> bool,
 ) -> Result<bool, Error> {
-    type Stage<S> = fn(&mut S, &layout::Frame) -> Result<(), Error>;
     let order: [Stage<S>; 5] = [
         S::trace_eye,     // pixels → EyeVertex[w·h]
         S::trace_photons, // lights → Photon[n]
@@ -167,6 +180,18 @@ pub fn iterate_while<S: Stages + ?Sized>(
         S::gather,        // EyeVertex, tree → radiance[w·h]
         S::accumulate,    // radiance → film
     ];
+    run(stages, frame, &order, go_on)
+}
+
+type Stage<S> = fn(&mut S, &layout::Frame) -> Result<(), Error>;
+
+/// Whether it came to the end.
+fn run<S: Stages + ?Sized>(
+    stages: &mut S,
+    frame: &layout::Frame,
+    order: &[Stage<S>],
+    mut go_on: impl FnMut() -> bool,
+) -> Result<bool, Error> {
     for stage in order {
         if !go_on() {
             return Ok(false);

@@ -109,9 +109,9 @@ fn points(scene: &Scene, with_inward: bool) -> impl Iterator<Item = (Vec3, f32)>
 }
 
 impl Scene {
-    /// Least and greatest corner of all surfaces, metres; those of a cube of side 1 about the origin if there are none.
-    pub fn bounds(&self) -> [Vec3; 2] {
-        bounding_box(self, true).unwrap_or([Vec3::splat(-0.5), Vec3::splat(0.5)])
+    /// Least and greatest corner of all surfaces, metres; none if there are none.
+    pub fn bounds(&self) -> Option<[Vec3; 2]> {
+        bounding_box(self, true)
     }
 }
 

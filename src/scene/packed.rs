@@ -1,5 +1,7 @@
 //! [`PackedScene`]: the only form a backend reads.
 
+use std::sync::Arc;
+
 use glam::{Vec2, Vec3, Vec3A, Vec4};
 use half::f16;
 use obvhs::aabb::Aabb;
@@ -33,21 +35,36 @@ pub struct PackedScene {
     pub environment_rows: Vec<f32>,
     /// Directional albedo of the GGX lobe ([`albedo`]).
     pub albedo: Vec<[f32; 2]>,
+    /// Of the primitives: where each was among those of the scene.
+    pub order: Vec<u32>,
     /// What the CPU goes by instead of `nodes`, if it is there.
-    pub kd: Option<SceneKd>,
+    pub kd: Option<Arc<SceneKd>>,
 }
 
 impl PackedScene {
     /// Packs a scene that [`Scene::check`] has passed.
     pub fn new(scene: &Scene) -> Self {
+        Self::pack(scene, None)
+    }
+
+    /// The same. If all primitives are where they were in `before`, its trees are taken over: materials, lights and the
+    /// environment can change at little cost.
+    pub fn new_after(before: &Self, scene: &Scene) -> Self {
+        Self::pack(scene, Some(before))
+    }
+
+    fn pack(scene: &Scene, before: Option<&Self>) -> Self {
         let mut packed = Self { albedo: albedo::table().to_vec(), ..Self::default() };
         packed.pack_images(scene);
         packed.pack_materials(scene);
         let unordered = packed.pack_primitives(scene);
         let boxes: Vec<Aabb> = unordered.iter().map(primitive_box).collect();
-        let (nodes, order) = bvh::build(&boxes);
-        packed.nodes = nodes;
-        packed.primitives = order.iter().map(|&i| unordered[i as usize]).collect();
+        (packed.nodes, packed.order) = match before.filter(|before| before.has_boxes(&boxes)) {
+            Some(before) => (before.nodes.clone(), before.order.clone()),
+            None => bvh::build(&boxes),
+        };
+        packed.primitives = packed.order.iter().map(|&i| unordered[i as usize]).collect();
+        packed.kd = before.filter(|before| before.has_shapes(&packed.primitives)).and_then(|before| before.kd.clone());
 
         let bounds = bvh::bounds(&boxes);
         if !boxes.is_empty() {
@@ -60,11 +77,12 @@ impl PackedScene {
         packed
     }
 
-    /// With another accelerator for the CPU; a GPU does not mind. Fails as [`SceneKd::new`] does.
+    /// With another accelerator for the CPU, unless it has it already; a GPU does not mind. Fails as [`SceneKd::new`] does.
     pub fn accelerated(mut self, by: Accelerator) -> Result<Self, kd::Error> {
-        self.kd = match by {
-            Accelerator::Bvh => None,
-            Accelerator::Kd => Some(SceneKd::new(&self.primitives)?),
+        self.kd = match (by, self.kd) {
+            (Accelerator::Bvh, _) => None,
+            (Accelerator::Kd, Some(kd)) => Some(kd),
+            (Accelerator::Kd, None) => Some(Arc::new(SceneKd::new(&self.primitives)?)),
         };
         Ok(self)
     }
@@ -72,6 +90,18 @@ impl PackedScene {
     /// What the CPU goes by.
     pub fn accelerator(&self) -> Accelerator {
         if self.kd.is_some() { Accelerator::Kd } else { Accelerator::Bvh }
+    }
+
+    /// Whether the primitives are where these are. Equal boxes do not say it of triangles.
+    fn has_shapes(&self, primitives: &[Primitive]) -> bool {
+        let shape = |p: &Primitive| (p.a, p.b, p.c, p.flags & layout::PRIMITIVE_SPHERE);
+        self.primitives.iter().map(shape).eq(primitives.iter().map(shape))
+    }
+
+    /// Whether these are the boxes of the primitives, as they come from the scene.
+    fn has_boxes(&self, boxes: &[Aabb]) -> bool {
+        let mut pairs = self.order.iter().zip(&self.primitives);
+        self.order.len() == boxes.len() && pairs.all(|(&i, p)| primitive_box(p) == boxes[i as usize])
     }
 
     fn pack_images(&mut self, scene: &Scene) {
@@ -412,6 +442,29 @@ fn mesh_tangents(mesh: &super::Mesh, map: Option<&Texture>) -> Vec<Vec4> {
 mod tests {
     use super::*;
     use crate::scene::{Material, Mesh};
+
+    #[test]
+    fn a_tree_is_taken_over_where_it_is_the_same() {
+        let mut scene = crate::scene::shipped::shipped("glass").expect("it is shipped");
+        let before = PackedScene::new(&scene);
+        let same = |a: &PackedScene, b: &PackedScene| {
+            assert!(a.nodes == b.nodes && a.primitives == b.primitives && a.materials == b.materials);
+            assert!(a.lights == b.lights && a.info == b.info);
+        };
+        scene.materials[0].emission = Vec3::ONE;
+        scene.materials.last_mut().expect("it has some").roughness = 0.5;
+        let after = PackedScene::new_after(&before, &scene);
+        same(&after, &PackedScene::new(&scene));
+        assert!(after.lights.len() > before.lights.len());
+        // Something vanishes, something moves.
+        scene.materials[0].alpha = AlphaMode::Mask(1.5);
+        same(&PackedScene::new_after(&before, &scene), &PackedScene::new(&scene));
+        scene.materials[0].alpha = AlphaMode::Opaque;
+        scene.meshes[0].positions[0] += 9.0;
+        let moved = PackedScene::new_after(&before, &scene);
+        same(&moved, &PackedScene::new(&scene));
+        assert!(moved.nodes != before.nodes);
+    }
 
     #[test]
     fn an_alpha_cutoff_above_one_hides_the_mesh() {

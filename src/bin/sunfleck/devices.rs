@@ -172,15 +172,18 @@ impl Device {
         }
     }
 
-    /// The scene as it is computed with.
-    pub fn pack(&self, scene: &Scene) -> Result<Arc<PackedScene>> {
-        let packed = PackedScene::new(scene).accelerated(self.accelerator());
-        Ok(Arc::new(packed.context("no kd-tree over this scene")?))
+    /// The scene as it is computed with. `before` is the same with other materials and lights, perhaps.
+    pub fn pack(&self, scene: &Scene, before: Option<&PackedScene>) -> Result<Arc<PackedScene>> {
+        let packed = match before {
+            Some(before) => PackedScene::new_after(before, scene),
+            None => PackedScene::new(scene),
+        };
+        Ok(Arc::new(packed.accelerated(self.accelerator()).context("no kd-tree over this scene")?))
     }
 
     /// Takes the scene to the device.
     pub fn stages(&self, input: &Input) -> Result<Box<dyn Stages>> {
-        self.stages_of(self.pack(&input.scene)?, input, None)
+        self.stages_of(self.pack(&input.scene, None)?, input, None)
     }
 
     /// The same with a scene of [`Device::pack`]. A dispatch on a graphics card is to take `dispatch_seconds` at most.

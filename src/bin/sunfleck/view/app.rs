@@ -10,7 +10,7 @@ use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::Camera;
 use sunfleck::scene::settings::Settings;
 
-use super::engine::{Choice, Engine, Limits, Message, Now, Opened, Save, Wake, Wanted};
+use super::engine::{Choice, Engine, Limits, Message, Now, Opened, Phase, Save, Wake, Wanted};
 use super::files;
 use super::picture::PictureView;
 use super::state::{Edits, Remembered};
@@ -302,6 +302,11 @@ impl Viewer {
 
     fn look_at_engine(&mut self, ui: &egui::Ui) {
         self.now = self.engine.now();
+        if self.now.opened.as_ref().is_some_and(|opened| Some(&opened.choice) != self.wanted.scene.as_ref()) {
+            // Left of a scene that is not wanted any more, until a stage of it comes to its end.
+            (self.now.opened, self.now.frame, self.now.painted) = (None, None, None);
+            self.now.phase = if self.wanted.scene.is_some() { Phase::Loading } else { Phase::Empty };
+        }
         if let Some(painted) = &self.now.painted {
             self.timing.see(Instant::now(), painted.frame.estimate);
         }

@@ -93,6 +93,8 @@ pub enum Phase {
 /// What was read.
 #[derive(Clone, Debug)]
 pub struct Opened {
+    /// What asked for it.
+    pub choice: Arc<Choice>,
     /// With the settings that it was opened with.
     pub source: Source,
     /// The settings as their file has them.
@@ -102,9 +104,13 @@ pub struct Opened {
 }
 
 impl Opened {
-    /// Least and greatest corner of the scene as its file has it, metres.
+    /// Least and greatest corner of the scene and of the spheres that its settings add, metres; those of a cube of side 1
+    /// about the origin if there is nothing.
     pub fn bounds(&self) -> [Vec3; 2] {
-        self.loaded.scene.bounds()
+        let spheres =
+            self.source.settings.spheres.iter().map(|s| [-1.0, 1.0].map(|side| s.radius * side + Vec3::from(s.centre)));
+        let union = |[a, b]: [Vec3; 2], [c, d]: [Vec3; 2]| [a.min(c), b.max(d)];
+        self.loaded.scene.bounds().into_iter().chain(spheres).reduce(union).unwrap_or([-0.5, 0.5].map(Vec3::splat))
     }
 
     /// What renders this scene with `settings` on the command line.

@@ -81,7 +81,8 @@ pub struct Session {
     estimate: u64,
     params: Params,
     is_preview: bool,
-    radii: Arc<Vec<f32>>,
+    /// None before the pilot.
+    radii: Option<Arc<Vec<f32>>>,
     split: Split,
     first_radius: f32,
     /// Done in this estimate.
@@ -91,8 +92,15 @@ pub struct Session {
 }
 
 impl Session {
-    pub fn new(device: &Device, opened: Arc<Opened>, settings: Arc<Settings>, input: Input) -> Result<Self> {
-        let scene = device.pack(&input.scene)?;
+    /// `before` is the same scene with other materials and lights, perhaps.
+    pub fn new(
+        device: &Device,
+        opened: Arc<Opened>,
+        settings: Arc<Settings>,
+        input: Input,
+        before: Option<&PackedScene>,
+    ) -> Result<Self> {
+        let scene = device.pack(&input.scene, before)?;
         let stages = device.stages_of(Arc::clone(&scene), &input, Some(DISPATCH_SECONDS))?;
         let params = input.params.clone();
         Ok(Self {
@@ -104,13 +112,18 @@ impl Session {
             estimate: 0,
             params,
             is_preview: false,
-            radii: Arc::default(),
+            radii: None,
             split: Split::default(),
             first_radius: 0.0,
             n_iterations: 0,
             seconds: 0.0,
             shown: None,
         })
+    }
+
+    /// What it renders; the memory of the device is given back.
+    pub fn into_scene(self) -> Arc<PackedScene> {
+        self.scene
     }
 
     /// Begins anew: another camera perhaps, other parameters, or a preview. `estimate` names it.
@@ -126,16 +139,28 @@ impl Session {
         self.stages.set_camera(self.input.camera.pack(width, height), self.params.film_size())?;
         (self.estimate, self.is_preview) = (estimate, is_preview);
         (self.n_iterations, self.seconds, self.shown) = (0, 0.0, None);
-        self.split = Split::default();
-        self.radii = Arc::new(ppm::start(&mut *self.stages, &self.params)?);
-        let mut radii: Vec<f32> = self.radii.iter().copied().filter(|r| *r > 0.0 && r.is_finite()).collect();
-        let middle = radii.len() / 2;
-        self.first_radius =
-            if radii.is_empty() { 0.0 } else { *radii.select_nth_unstable_by(middle, f32::total_cmp).1 };
+        (self.split, self.radii) = (Split::default(), None);
         Ok(())
     }
 
-    /// One iteration; none if `is_stale` says between two stages that its picture is not wanted any more.
+    /// The first radii, if there are none yet; whether there are, for `is_stale` may say between two stages that nobody
+    /// wants them any more.
+    pub fn start(&mut self, mut is_stale: impl FnMut() -> bool) -> Result<bool, Error> {
+        if self.radii.is_some() {
+            return Ok(true);
+        }
+        let Some(radii) = ppm::start_while(&mut *self.stages, &self.params, || !is_stale())? else {
+            return Ok(false);
+        };
+        let mut usable: Vec<f32> = radii.iter().copied().filter(|r| *r > 0.0 && r.is_finite()).collect();
+        let middle = usable.len() / 2;
+        self.first_radius =
+            if usable.is_empty() { 0.0 } else { *usable.select_nth_unstable_by(middle, f32::total_cmp).1 };
+        self.radii = Some(Arc::new(radii));
+        Ok(true)
+    }
+
+    /// One iteration, after [`Session::start`]; none if `is_stale`, as there.
     pub fn iterate(&mut self, mut is_stale: impl FnMut() -> bool) -> Result<Option<Record>, Error> {
         let began = Instant::now();
         let frame = self.params.frame(self.n_iterations + 1);
@@ -188,7 +213,7 @@ impl Session {
             scene: Arc::clone(&self.scene),
             opened: Arc::clone(&self.opened),
             settings: Arc::clone(&self.settings),
-            first_radii: Arc::clone(&self.radii),
+            first_radii: self.radii.clone().unwrap_or_default(),
             insides: None,
             first_radius: self.first_radius,
             radius: self.first_radius * ppm::RadiusSchedule::new(self.params.alpha).scale(self.n_iterations.max(1)),
@@ -200,7 +225,8 @@ impl Session {
     fn insides(&mut self) -> Result<Insides, Error> {
         let frame = self.params.frame(self.n_iterations);
         let (vertices, photons) = (self.stages.eye_vertices()?, self.stages.photons()?);
-        let iteration = inspect::Iteration::new(&self.scene, &frame, &vertices, &self.radii, &photons);
+        let radii = self.radii.as_deref().map_or(&[][..], Vec::as_slice);
+        let iteration = inspect::Iteration::new(&self.scene, &frame, &vertices, radii, &photons);
         self.split.add(&iteration.split());
         let nodes_visited = iteration.nodes_visited();
         Ok(Insides { split: self.split.clone(), nodes_visited, photons })

@@ -156,9 +156,9 @@ impl Have {
             None => {
                 let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
                 shared.update(|board| board.phase = Phase::Preparing);
-                self.session = None; // Its memory first.
+                let before = self.session.take().map(Session::into_scene); // Its memory first.
                 let warnings: Vec<_> = input.warnings.iter().cloned().map(Message::Warning).collect();
-                let session = Session::new(device, opened, Arc::new(settings), input)?;
+                let session = Session::new(device, opened, Arc::new(settings), input, before.as_deref())?;
                 shared.update(|board| {
                     board.messages.extend(warnings);
                     board.device = session.device();
@@ -185,7 +185,6 @@ impl Have {
     fn iterate(&mut self, shared: &Shared, wanted: &Wanted) -> Result<()> {
         let Some(session) = &mut self.session else { return Ok(()) };
         let opened = Arc::clone(&session.opened);
-        shared.enter(Phase::Rendering);
         // The first picture of a preview is always shown, or a camera that keeps moving would show none.
         let keep_on = wanted.moving && session.n_iterations == 0;
         let is_stale = || {
@@ -197,6 +196,10 @@ impl Have {
                     && ((wanted.moving, wanted.restarts) != (now.moving, now.restarts)
                         || rendered(&opened, wanted) != rendered(&opened, now))
         };
+        if !session.start(is_stale)? {
+            return Ok(());
+        }
+        shared.enter(Phase::Rendering);
         let Some(record) = session.iterate(is_stale)? else { return Ok(()) };
         if wanted.paused {
             self.steps_done = (self.steps_done + 1).min(wanted.steps);
@@ -254,7 +257,7 @@ fn resting(wanted: &Wanted) -> Phase {
 }
 
 /// Reads a scene and the settings that lie beside it.
-fn open(choice: &Choice) -> Result<Opened> {
+fn open(choice: &Arc<Choice>) -> Result<Opened> {
     let mut source = Source::resolve(&choice.name)?;
     let read = source.settings.clone();
     for pair in &choice.set {
@@ -262,7 +265,7 @@ fn open(choice: &Choice) -> Result<Opened> {
     }
     source.locate();
     let loaded = source.scene()?;
-    Ok(Opened { source, read, loaded })
+    Ok(Opened { choice: Arc::clone(choice), source, read, loaded })
 }
 
 /// Those settings that the estimate depends on.

@@ -8,7 +8,7 @@ use sunfleck::output::difference::Measure;
 use sunfleck::scene::shipped::NAMES;
 
 use super::Window;
-use crate::view::engine::{Comparison, View};
+use crate::view::engine::{Choice, Comparison, Phase, View};
 use crate::view::files::Purpose;
 use crate::view::keys::SHORTCUTS;
 
@@ -340,4 +340,27 @@ fn every_control_has_a_name() {
     }
     window.steps(3);
     assert_eq!(window.harness.unnamed_widgets(), [""; 0]);
+}
+
+/// However long the render thread takes: here it is in the middle of a stage of several seconds.
+#[test]
+fn a_scene_that_is_left_is_gone_at_once() {
+    let mut window = Window::new(None);
+    let set = ["size=1400x1400", "photons=1"].map(str::to_owned).to_vec();
+    window.viewer().wanted.scene = Some(Choice { name: "glass".to_owned(), set }.into());
+    window.wait("first photons", |viewer| matches!(viewer.now.phase, Phase::Starting | Phase::Rendering));
+    window.steps(2);
+    assert!(window.viewer().opened().is_some());
+    window.viewer().close_scene();
+    window.steps(2);
+    assert!(window.viewer().opened().is_none() && window.viewer().now.phase == Phase::Empty);
+    assert!(window.harness.query_by_label("Settings").is_none());
+    // Nor do its settings become those of the next one.
+    window.viewer().open("cornell");
+    window.step();
+    let context = window.harness.ctx.clone();
+    window.viewer().edit_at(context.input(|i| i.time), "seed", |settings| settings.seed = Some(7));
+    window.step();
+    let is_next = window.viewer().opened().is_some_and(|opened| opened.source.name == "cornell");
+    assert!(is_next || window.viewer().wanted.settings.is_none());
 }
