@@ -226,7 +226,7 @@ def test_faults_are_named():
     assert report.open_edges.tolist() == [[int(i) for i in edge] for edge in edges]
 
     report = sunfleck.mesh_check(vertices, np.concatenate([faces, faces[:1], [[0, 0, 1]]]))
-    assert report.duplicates.tolist() == [[0, len(faces)]] and report.degenerate.tolist() == [len(faces) + 1]
+    assert report.duplicates.tolist() == [[len(faces), 0]] and report.degenerate.tolist() == [len(faces) + 1]
 
     moved = np.concatenate([vertices, vertices + [0.5, 0.1, 0.2], [[9, 9, 9]]])
     two = np.concatenate([faces, faces + len(vertices)])

@@ -53,7 +53,7 @@ class MeshReport:
     degenerate: NDArray[np.uint32]
     """Faces without area."""
     duplicates: NDArray[np.uint32]
-    """`[n, 2]`: a face, and a later one with the same three vertices."""
+    """`[n, 2]`: a face, and the earlier one with the same three vertices."""
     open_edges: NDArray[np.uint32]
     """`[n, 2]`: edges with one face, or another odd number."""
     crowded_edges: NDArray[np.uint32]

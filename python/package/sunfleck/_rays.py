@@ -45,8 +45,8 @@ class KdTree:
         single = vertices.dtype == np.float32
         self.dtype: np.dtype[Any] = np.dtype(np.float32 if single else np.float64)
         rows = triples(numbers(vertices, self.dtype), "coordinates a vertex")
-        tree: Any = KdTree32 if single else KdTree64
-        self._tree = tree(rows, _faces(faces), builder, lazy, parallel)
+        build = KdTree32 if single else KdTree64
+        self._tree: KdTree32 | KdTree64 = build(rows, _faces(faces), builder, lazy, parallel)
 
     def __len__(self) -> int:
         return len(self._tree)
