@@ -1,11 +1,13 @@
 //! Sunfleck: progressive photon mapping, and the neighbour search under it.
 //!
-//! Import order, left never names right: `math` → `index` → `points` → `mesh` → `device` → `layout` → `scene` → `ppm` → `cpu` |
+//! Import order, left never names right: `math` → `index` → `files` → `points` → `mesh` → `device` → `layout` → `scene` → `ppm` → `cpu` |
 //! `gpu` → `inspect` → `output`. `cpu` and `gpu` do not know each other.
 
 #[cfg(feature = "render")]
 pub mod cpu;
 pub mod device;
+#[cfg(any(feature = "points", feature = "mesh"))]
+mod files;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod index;

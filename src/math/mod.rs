@@ -5,5 +5,6 @@ pub mod frame;
 pub mod ggx;
 pub mod morton;
 pub mod oct;
+pub mod polygon;
 pub mod rng;
 pub mod warp;

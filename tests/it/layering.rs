@@ -3,14 +3,15 @@
 use std::path::Path;
 
 /// Each module with those it may use.
-const ALLOWED: [(&str, &[&str]); 12] = [
+const ALLOWED: [(&str, &[&str]); 13] = [
     ("math", &[]),
     ("index", &["math"]),
     ("device", &["index"]),
-    ("points", &["index", "math"]),
-    ("mesh", &["index", "math", "points"]),
+    ("files", &[]),
+    ("points", &["files", "index", "math"]),
+    ("mesh", &["files", "index", "math", "points"]),
     ("layout", &["index", "math"]),
-    ("scene", &["layout", "index", "math"]),
+    ("scene", &["mesh", "layout", "index", "math"]),
     ("ppm", &["scene", "layout", "device", "index", "math"]),
     ("cpu", &["ppm", "scene", "layout", "device", "index", "math"]),
     ("gpu", &["ppm", "scene", "layout", "device", "index", "math"]),

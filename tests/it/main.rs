@@ -24,6 +24,8 @@ mod layering;
 mod layout;
 #[cfg(feature = "render")]
 mod loading;
+#[cfg(feature = "mesh")]
+mod mesh;
 #[cfg(feature = "render")]
 mod physics;
 #[cfg(feature = "render")]

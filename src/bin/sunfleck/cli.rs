@@ -1,5 +1,6 @@
 //! The command line: what may be typed, and what it means.
 
+pub mod mesh;
 pub mod points;
 
 use std::path::PathBuf;
@@ -29,7 +30,8 @@ Examples:
   sunfleck render glass -o glass.png
   sunfleck render my.glb -o my.exr -o my.png --seconds 300 -r 1920x1080
   sunfleck compare my.exr reference.exr
-  sunfleck points normals scan.ply -o normals.ply";
+  sunfleck points normals scan.ply -o normals.ply
+  sunfleck mesh-check part.stl";
 
 const RENDER_EXAMPLES: &str = "\
 Examples:
@@ -88,6 +90,8 @@ pub enum Command {
     Bench(crate::bench::BenchArgs),
     /// Geometry tasks on point clouds: normals, correspondence, registration
     Points(points::PointsArgs),
+    /// Check a mesh: closed, manifold, normals outward, faces sound
+    MeshCheck(mesh::MeshCheckArgs),
 }
 
 #[derive(Debug, Args)]

@@ -5,6 +5,7 @@ mod cli;
 mod compare;
 mod devices;
 mod job;
+mod mesh_check;
 mod points;
 mod progress;
 mod render;
@@ -46,6 +47,7 @@ fn main() -> ExitCode {
         (Some(Command::Compare(args)), _) => compare::run(args),
         (Some(Command::Bench(args)), _) => bench::run(args),
         (Some(Command::Points(args)), _) => points::run(args),
+        (Some(Command::MeshCheck(args)), _) => mesh_check::run(args),
         (None, _) => {
             eprintln!("{GREETING}");
             return ExitCode::from(cli::USAGE);

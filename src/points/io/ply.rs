@@ -1,23 +1,17 @@
-//! PLY, by way of `ply-rs-bw`.
-//!
-//! The crate bounds what it allocates by itself. Two things it does not tell are looked for here: a count that the file's
-//! size belies, and a property named twice, which it takes for one and then misreads every row.
+//! Clouds as PLY.
 
-use std::io::{BufRead, Cursor, Read, Write};
+use std::io::{BufRead, Write};
 
 use glam::{DVec3, Vec3};
-use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{
     Addable, ElementDef, Encoding, Header, PropertyAccess, PropertyAccessResult, PropertyDef, PropertyType, ScalarType,
 };
 use ply_rs_bw::writer::Writer;
 
 use super::text::position;
-use super::{MAX_POINTS, plain, shorten};
+use crate::files::ply;
 use crate::points::{Cloud, Match, Precision};
 
-/// Bytes of a header, at most.
-const MAX_HEADER: u64 = 1 << 20;
 const POSITION: [&str; 3] = ["x", "y", "z"];
 const NORMAL: [&str; 3] = ["nx", "ny", "nz"];
 const COLOUR: [&str; 4] = ["red", "green", "blue", "alpha"];
@@ -97,40 +91,24 @@ impl PropertyAccess for Row {
     }
 }
 
-/// An element that is not wanted: takes no memory.
-struct Skipped;
-
-impl PropertyAccess for Skipped {
-    fn new() -> Self {
-        Self
-    }
-}
-
 /// Reads the `vertex` element of a PLY of `size` bytes: x, y, z, and nx, ny, nz and red, green, blue, alpha if they are
 /// there. Other properties and elements are left out. The error says which line or vertex.
-pub fn read_ply(mut input: impl BufRead, size: u64) -> Result<Cloud, String> {
-    let text = header_text(&mut input)?;
-    let mut reader = Reader::new(Cursor::new(text).chain(input));
-    let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(|e| in_words(&e, "the header"))?;
+pub fn read_ply(input: impl BufRead, size: u64) -> Result<Cloud, String> {
+    let (header, mut reader) = ply::read_header(input)?;
     let vertex = header.elements.get("vertex").ok_or("the header has no element vertex")?;
-    let has = |names: &[&str]| names.iter().all(|n| matches!(vertex.properties.get(*n), Some(p) if is_scalar(p)));
+    let has = |names: &[&str]| names.iter().all(|n| matches!(vertex.properties.get(*n), Some(p) if ply::is_scalar(p)));
     if !has(&POSITION) {
         return Err("the header's element vertex lacks a property x, y or z".into());
     }
     let is_ascii = header.encoding == Encoding::Ascii;
     for element in header.elements.values() {
-        check_count(element, is_ascii, size)?;
+        ply::check_count(element, is_ascii, size)?;
         if element.name == "vertex" {
             break;
         }
-        if element.properties.is_empty() && !is_ascii {
-            continue;
-        }
-        Parser::<Skipped>::new()
-            .read_payload_for_element(&mut reader, element, &header)
-            .map_err(|e| in_words(&e, &format!("element {}", shorten(&element.name))))?;
+        ply::skip(&mut reader, element, &header)?;
     }
-    let rows = rows(&mut reader, vertex, &header)?;
+    let rows: Vec<Row> = ply::rows(&mut reader, vertex, &header, "vertex")?;
     let mut positions = Vec::with_capacity(rows.len());
     for (i, row) in rows.iter().enumerate() {
         positions.push(position(row.position).map_err(|problem| format!("vertex {i}: {problem}"))?);
@@ -143,103 +121,6 @@ pub fn read_ply(mut input: impl BufRead, size: u64) -> Result<Cloud, String> {
         colours: has(&COLOUR[..3]).then(|| rows.iter().map(|row| row.colour).collect()),
         precision: if POSITION.iter().any(|n| is_double(n)) { Precision::Double } else { Precision::Single },
     })
-}
-
-/// Up to and including `end_header`.
-fn header_text(input: &mut impl BufRead) -> Result<Vec<u8>, String> {
-    let mut text = Vec::new();
-    let mut input = Read::take(input, MAX_HEADER);
-    let (mut line, mut element, mut names) = (Vec::new(), String::new(), Vec::new());
-    for at in 1.. {
-        line.clear();
-        let n = input.read_until(b'\n', &mut line).map_err(|e| plain(&e))?;
-        // Comments may be in any encoding that keeps ASCII.
-        let words = String::from_utf8_lossy(&line);
-        text.extend_from_slice(words.as_bytes());
-        let words: Vec<&str> = words.split_ascii_whitespace().collect();
-        if at == 1 && words != ["ply"] {
-            return Err("does not begin with a line \"ply\": not a PLY file".into());
-        }
-        match words[..] {
-            ["end_header"] if line.ends_with(b"\n") => return Ok(text),
-            ["element", name, ..] => {
-                if names.iter().any(|n: &String| n == name) {
-                    return Err(format!("line {at}: a second element {}", shorten(name)));
-                }
-                names.push(name.to_owned());
-                element = name.to_owned();
-            }
-            ["property", .., name] => {
-                // With the element's name, which holds no blank, before it.
-                let name = format!("{element} {name}");
-                if names.contains(&name) {
-                    return Err(format!("line {at}: a second property {}", shorten(&name)));
-                }
-                names.push(name);
-            }
-            _ => {}
-        }
-        if n == 0 {
-            return Err(match input.limit() {
-                0 => format!("a header of more than {} KiB", MAX_HEADER >> 10),
-                _ => "the file ends before end_header".into(),
-            });
-        }
-    }
-    Ok(text)
-}
-
-/// Refuses more rows than the file can hold.
-fn check_count(element: &ElementDef, is_ascii: bool, size: u64) -> Result<(), String> {
-    let of_scalar = |t: &ScalarType| match t {
-        _ if is_ascii => 2,
-        ScalarType::Char | ScalarType::UChar => 1,
-        ScalarType::Short | ScalarType::UShort => 2,
-        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
-        ScalarType::Double => 8,
-    };
-    let of_property = |p: &PropertyDef| match &p.data_type {
-        PropertyType::Scalar(t) | PropertyType::List(t, _) => of_scalar(t),
-    };
-    let row: u64 = element.properties.values().map(of_property).sum();
-    let row = if is_ascii { row.max(1) } else { row };
-    let name = shorten(&element.name);
-    if u128::from(row) * element.count as u128 > u128::from(size) + 1 {
-        return Err(format!(
-            "the header promises {} of element {name}, at least {row} bytes each, in a file of {size} bytes",
-            element.count
-        ));
-    }
-    if element.name == "vertex" && element.count as u64 > MAX_POINTS {
-        return Err(format!("{} vertices: at most {MAX_POINTS} are read", element.count));
-    }
-    Ok(())
-}
-
-fn rows<T: BufRead>(reader: &mut Reader<T>, vertex: &ElementDef, header: &Header) -> Result<Vec<Row>, String> {
-    let first = reader.line();
-    Parser::<Row>::new().read_payload_for_element(reader, vertex, header).map_err(|e| {
-        let place = match e.line().filter(|_| header.encoding != Encoding::Ascii) {
-            Some(line) => format!("vertex {} of {}", line.saturating_sub(first), vertex.count),
-            None => format!("a vertex of {} properties is expected", vertex.properties.len()),
-        };
-        in_words(&e, &place)
-    })
-}
-
-/// The crate's errors quote whole lines and Rust types: the line number and the kind say it shorter.
-fn in_words(error: &ParseError, what: &str) -> String {
-    use std::io::ErrorKind;
-    let line = error.line().filter(|_| !what.starts_with("vertex ")).map_or(String::new(), |n| format!("line {n}: "));
-    match error.kind() {
-        ErrorKind::UnexpectedEof => format!("{line}the file ends too early: {what}"),
-        ErrorKind::InvalidInput | ErrorKind::InvalidData => format!("{line}cannot be understood: {what}"),
-        kind => format!("{line}{kind}: {what}"),
-    }
-}
-
-fn is_scalar(property: &PropertyDef) -> bool {
-    matches!(property.data_type, PropertyType::Scalar(_))
 }
 
 fn is_exact_in_f32(property: &PropertyDef) -> bool {

@@ -15,6 +15,7 @@ mod obj;
 mod packing;
 
 use super::Scene;
+use crate::mesh;
 pub use environment::load_environment;
 use files::Source;
 use std::path::{Path, PathBuf};
@@ -132,6 +133,15 @@ pub fn load(path: &Path) -> Result<Loaded, LoadError> {
         warnings.push(format!("{}: there are no triangles", path.display()));
     }
     Ok(Loaded { scene, warnings: warnings.finish() })
+}
+
+/// Reads the triangles of a `.gltf` or `.glb` file for a check: in double precision, nodes applied, faces in the order of the
+/// nodes and their primitives. And what in the file was not honoured.
+pub fn load_gltf_mesh(path: &Path) -> Result<(mesh::io::Loaded, Vec<String>), LoadError> {
+    let (source, bytes) = Source::open(path)?;
+    let mut warnings = Warnings::default();
+    let mesh = gltf::load_geometry(&source, &bytes, &mut warnings)?;
+    Ok((mesh::io::Loaded::of_triangles(mesh), warnings.finish()))
 }
 
 /// Collects warnings, each once, a bounded number of them.

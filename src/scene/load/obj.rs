@@ -5,8 +5,9 @@
 use super::files::Source;
 use super::mtl::Library;
 use super::{Budget, LoadError, MAX_MESHES, MAX_VERTICES, Warnings, geometry};
+use crate::math::polygon::triangulate;
 use crate::scene::{Material, Mesh, Scene};
-use glam::{Vec2, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
 
 /// Reads a scene; `bytes` is the content of the file.
@@ -244,9 +245,9 @@ impl<'a> Parser<'a> {
                 group.triangles.push(triangle);
             }
             face => {
-                let points: Vec<Vec3> = face.iter().map(|corner| self.positions[corner.0 as usize]).collect();
+                let points: Vec<DVec3> = face.iter().map(|c| self.positions[c.0 as usize].as_dvec3()).collect();
                 let vertices: Vec<u32> = face.iter().map(vertex).collect();
-                group.triangles.extend(geometry::triangulate(&points).map(|triangle| triangle.map(|i| vertices[i])));
+                group.triangles.extend(triangulate(&points).map(|triangle| triangle.map(|i| vertices[i])));
             }
         }
         Ok(())

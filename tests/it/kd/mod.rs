@@ -1,6 +1,6 @@
 //! kd-trees over triangles.
 
-mod meshes;
+pub mod meshes;
 mod queries;
 mod trees;
 mod watertight;

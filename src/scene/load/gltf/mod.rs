@@ -12,6 +12,7 @@ mod primitive;
 use super::files::Source;
 use super::image::ImageTable;
 use super::{Budget, LoadError, Warnings};
+use crate::mesh::Mesh;
 use crate::scene::Scene;
 use buffers::Buffers;
 use document::Document;
@@ -46,10 +47,7 @@ const IGNORED_EXTENSIONS: &[&str] = &[
 
 /// Reads a scene; `bytes` is the content of the file.
 pub(super) fn load(source: &Source, bytes: &[u8], warnings: &mut Warnings) -> Result<Scene, LoadError> {
-    let (json, binary) = if bytes.starts_with(b"glTF") { split_glb(source, bytes)? } else { (bytes, None) };
-    let document = parse(source, json)?;
-    check_version(source, &document)?;
-    check_extensions(source, &document, warnings)?;
+    let (document, binary) = open(source, bytes, warnings)?;
     let buffers = Buffers::load(source, &document, binary)?;
     let mut scene = Scene::default();
     let mut images = ImageTable::new();
@@ -62,6 +60,26 @@ pub(super) fn load(source: &Source, bytes: &[u8], warnings: &mut Warnings) -> Re
     // Last, and several at a time: the costliest part of many files.
     scene.images = images.decode(source)?;
     Ok(scene)
+}
+
+/// Reads the triangles alone.
+pub(super) fn load_geometry(source: &Source, bytes: &[u8], warnings: &mut Warnings) -> Result<Mesh, LoadError> {
+    let (document, binary) = open(source, bytes, warnings)?;
+    let buffers = Buffers::load(source, &document, binary)?;
+    let nodes = nodes::place(source, &document, &buffers, warnings)?;
+    primitive::load_geometry(source, &document, &buffers, &nodes.placements, warnings)
+}
+
+fn open<'a>(
+    source: &Source,
+    bytes: &'a [u8],
+    warnings: &mut Warnings,
+) -> Result<(Document, Option<&'a [u8]>), LoadError> {
+    let (json, binary) = if bytes.starts_with(b"glTF") { split_glb(source, bytes)? } else { (bytes, None) };
+    let document = parse(source, json)?;
+    check_version(source, &document)?;
+    check_extensions(source, &document, warnings)?;
+    Ok((document, binary))
 }
 
 /// The JSON and the binary chunk of a GLB file.

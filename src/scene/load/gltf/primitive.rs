@@ -77,6 +77,42 @@ pub(super) fn load_all(
     Ok(())
 }
 
+/// The placed meshes in one, in double precision: nothing is left out that has no area.
+pub(super) fn load_geometry(
+    source: &Source,
+    document: &Document,
+    buffers: &Buffers,
+    placements: &[Placement],
+    warnings: &mut Warnings,
+) -> Result<crate::mesh::Mesh, LoadError> {
+    let mut all = crate::mesh::Mesh::default();
+    let mut budget = Budget::new();
+    let mut reader = Reader { source, buffers, warnings };
+    for placement in placements {
+        let mesh = &document.meshes[placement.mesh];
+        let weights = document.nodes[placement.node].weights.as_deref().unwrap_or(&mesh.weights);
+        let mirrored = placement.world_from_mesh.matrix3.determinant() < 0.0;
+        for (i, primitive) in mesh.primitives.iter().enumerate() {
+            let place = format!("meshes[{}].primitives[{i}]", placement.mesh);
+            reader.reserve(primitive, &place, 1, &mut budget)?;
+            let Some(local) = reader.primitive(primitive, weights, &place)? else { continue };
+            let first = all.vertices.len() as u32;
+            for p in &local.positions {
+                let p = placement.world_from_mesh.transform_point3(p.as_dvec3());
+                if !p.is_finite() {
+                    let problem = format!("vertex {} is not finite", all.vertices.len() as u32 - first);
+                    return Err(source.invalid(format!("{place} at nodes[{}]", placement.node), problem));
+                }
+                all.vertices.push(p.to_array());
+            }
+            // As seen in the world: glTF turns the winding of what is mirrored.
+            let turned = |[a, b, c]: [u32; 3]| if mirrored { [a, c, b] } else { [a, b, c] };
+            all.faces.extend(local.triangles.iter().map(|corners| turned(*corners).map(|v| first + v)));
+        }
+    }
+    Ok(all)
+}
+
 fn name(document: &Document, mesh: &document::Mesh, placements: &[Placement], primitive: usize) -> String {
     let of_node = || placements.first().and_then(|placement| document.nodes[placement.node].name.clone());
     let name = mesh.name.clone().or_else(of_node).unwrap_or_else(|| "mesh".into());

@@ -1,0 +1,45 @@
+//! What may be typed after `sunfleck mesh-check`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+const HELP: &str = "\
+Normals are judged where the mesh is closed and no faces intersect: by a ray from each face, which
+must agree with the way that neighbours run along their common edge. Nothing depends on the unit of
+length. Vertices in exactly the same place are one. Faces and vertices are counted from 0, in the
+order of the file; an OBJ's own indices are one more.
+
+Read are .obj, .ply, .stl, .off, .gltf, .glb, and .node with .face beside it (TetGen); written are
+.obj, .ply, .stl (in single precision) and .off.
+
+Examples:
+  sunfleck mesh-check eros.obj
+  sunfleck mesh-check scan.ply --json
+  sunfleck mesh-check part.stl --fix -o fixed.obj
+
+Exit codes: 0 closed, manifold, all normals outward, no degenerate, duplicate or intersecting faces
+(with --fix: so is what was written); 1 not so, or an error; 2 wrong usage.";
+
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub struct MeshCheckArgs {
+    /// The mesh
+    #[arg(value_name = "MESH")]
+    pub mesh: PathBuf,
+    /// Turn round the faces that point inward; needs -o
+    #[arg(long, requires = "output")]
+    pub fix: bool,
+    /// Where to put the mesh with --fix: .obj, .ply, .stl or .off, in triangles
+    #[arg(short, long, value_name = "OUT", requires = "fix")]
+    pub output: Option<PathBuf>,
+    /// Print JSON, with all faces
+    #[arg(long)]
+    pub json: bool,
+    /// Do not look for faces that intersect, and judge as if there were none
+    #[arg(long)]
+    pub no_intersections: bool,
+    /// CPU threads [default: all]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+}
