@@ -1,4 +1,4 @@
-//! Times every stage of an iteration over the shipped scenes, on the CPU and on a GPU.
+//! Times every stage of an iteration over the shipped scenes, on the CPU with either accelerator and on a GPU.
 //!
 //! ```text
 //! cargo bench --bench iteration -- --scene glass --scene pool --size 512x512 --photons 100000,500000 --json out.json
@@ -7,14 +7,19 @@
 //! Backends take turns (A B A B) within a run; figures are medians over the iterations, the first ones not counted. With
 //! `--threads 1` seconds on the CPU are CPU seconds.
 
+use std::hint::black_box;
 use std::sync::Arc;
+use std::time::Instant;
 
 use anyhow::{Context as _, Result, bail};
 use clap::Parser;
 use serde_json::{Value, json};
-use sunfleck::cpu::CpuStages;
+use sunfleck::cpu::trace::{self, Ray, Seer};
+use sunfleck::cpu::{CpuStages, camera};
+use sunfleck::layout;
+use sunfleck::math::{rng, warp};
 use sunfleck::ppm::{self, Params, StageTimes, Stages};
-use sunfleck::scene::{PackedScene, shipped};
+use sunfleck::scene::{Accelerator, PackedScene, shipped};
 
 #[derive(Parser)]
 #[command(about = "Times every stage of an iteration")]
@@ -28,7 +33,7 @@ struct Args {
     /// Photon paths an iteration; several separated by commas
     #[arg(long, default_value = "262144", value_delimiter = ',')]
     photons: Vec<u32>,
-    /// `cpu`, `gpu` or both
+    /// `cpu`, `cpu-kd` (its kd-tree), `gpu`; several separated by commas
     #[arg(long, default_value = "cpu,gpu", value_delimiter = ',')]
     backend: Vec<String>,
     /// Iterations counted
@@ -62,13 +67,29 @@ fn main() -> Result<()> {
     for name in names {
         let scene = shipped::shipped(name).with_context(|| format!("no scene {name}"))?;
         let camera = scene.cameras.first().context("no camera")?.pack(size[0], size[1]);
+        let start = Instant::now();
         let packed = Arc::new(PackedScene::new(&scene));
+        let (seconds, bytes) = (start.elapsed().as_secs_f64(), size_of_val(&*packed.nodes));
+        println!("{name}, packed with its BVH in {:.1} ms, nodes {bytes} bytes", 1e3 * seconds);
+        let mut kd = None;
+        if args.backend.iter().any(|b| b == "cpu-kd") {
+            let unaccelerated = PackedScene::clone(&packed);
+            let start = Instant::now();
+            let accelerated = Arc::new(unaccelerated.accelerated(Accelerator::Kd)?);
+            let (seconds, bytes) = (start.elapsed().as_secs_f64(), accelerated.kd.as_ref().map_or(0, |kd| kd.bytes()));
+            println!("{name}, kd-tree in {:.1} ms, {bytes} bytes", 1e3 * seconds);
+            rows.push(json!({ "scene": name, "rays": rays([&packed, &accelerated], &camera, size) }));
+            kd = Some(accelerated);
+        }
         for &n_paths in &args.photons {
             let params = Params { n_paths, ..Params::new(size[0], size[1]) };
             let mut backends = Vec::new();
             for backend in &args.backend {
                 let stages: Option<Box<dyn Stages>> = match backend.as_str() {
                     "cpu" => Some(Box::new(CpuStages::new(packed.clone(), camera, size))),
+                    "cpu-kd" => {
+                        kd.as_ref().map(|kd| Box::new(CpuStages::new(kd.clone(), camera, size)) as Box<dyn Stages>)
+                    }
                     "gpu" => gpu(&packed, camera),
                     other => bail!("no backend {other}"),
                 };
@@ -94,6 +115,51 @@ fn gpu(packed: &PackedScene, camera: sunfleck::layout::Camera) -> Option<Box<dyn
 fn gpu(_: &PackedScene, _: sunfleck::layout::Camera) -> Option<Box<dyn Stages>> {
     println!("built without the GPU backend");
     None
+}
+
+/// Nanoseconds a ray, one thread, median of rounds in which the two accelerators take turns: the camera's rays, and rays from
+/// where they end into any direction, for the nearest hit and for any.
+fn rays(scenes: [&PackedScene; 2], camera: &layout::Camera, size: [u32; 2]) -> Value {
+    const ROUNDS: usize = 9;
+    let ray = |origin, direction, i| Ray { origin, direction, t_max: f32::INFINITY, alpha_seed: i, seer: Seer::Eye };
+    let frame = Params::new(size[0], size[1]).frame(1);
+    let random = |i: u32| rng::pcg4d([i, 1, 2, 3]).map(rng::unit);
+    let first: Vec<Ray> = (0..size[0] * size[1])
+        .map(|i| {
+            let (origin, direction) = camera::ray(camera, &frame, i % size[0], i / size[0], random(i));
+            ray(origin, direction, i)
+        })
+        .collect();
+    let next = |r: &Ray| {
+        let hit = trace::nearest(scenes[0], r)?;
+        let u = random(!r.alpha_seed);
+        Some(ray(r.origin + (hit.t * 0.9999) * r.direction, warp::sphere([u[0], u[1]]), r.alpha_seed))
+    };
+    let second: Vec<Ray> = first.iter().filter_map(next).collect();
+    type Ask = fn(&PackedScene, &Ray) -> bool;
+    let asks: [(&str, &[Ray], Ask); 3] = [
+        ("camera, nearest", &first, |scene, ray| trace::nearest(scene, ray).is_some()),
+        ("second, nearest", &second, |scene, ray| trace::nearest(scene, ray).is_some()),
+        ("second, any", &second, trace::occluded),
+    ];
+    let mut found = serde_json::Map::new();
+    for (what, rays, ask) in asks {
+        let mut times = [const { Vec::new() }; 2];
+        for _ in 0..ROUNDS {
+            for (scene, times) in scenes.iter().zip(&mut times) {
+                let start = Instant::now();
+                black_box(rays.iter().filter(|ray| ask(scene, ray)).count());
+                times.push(1e9 * start.elapsed().as_secs_f64() / rays.len().max(1) as f64);
+            }
+        }
+        let [bvh, kd] = times.map(|mut times: Vec<f64>| {
+            times.sort_by(f64::total_cmp);
+            times[ROUNDS / 2]
+        });
+        println!("  {what:<16} bvh {bvh:7.0} ns, kd {kd:7.0} ns, {:.2}", kd / bvh);
+        found.insert(what.into(), json!({ "bvh": bvh, "kd": kd, "rays": rays.len() }));
+    }
+    found.into()
 }
 
 fn measure(args: &Args, scene: &str, params: &Params, mut backends: Vec<Box<dyn Stages>>) -> Result<Vec<Value>> {

@@ -1,11 +1,14 @@
-//! The native half of the Python package: contiguous `f32` arrays in, arrays out. Shapes, defaults and conversions are the
+//! The native half of the Python package: contiguous arrays in, arrays out. Shapes, defaults and conversions are the
 //! business of `package/sunfleck/__init__.py`.
 
 use ::sunfleck::index::{self, MAX_K, PointBvh, PointOrder, Radii, RadiusSearch};
 use glam::Vec3;
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{Element, IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+
+mod kd;
+mod mesh;
 
 type Array<'py, T> = Bound<'py, PyArray1<T>>;
 
@@ -63,7 +66,8 @@ impl Tree {
         k: i64,
     ) -> PyResult<(Array<'py, f32>, Array<'py, u32>)> {
         let (queries, radii) = (rows(&queries)?, checked(&radii, each)?);
-        let k = usize::try_from(k).map_err(|_| PyValueError::new_err(format!("k is {k}: 1 to {MAX_K} are possible")))?;
+        let k =
+            usize::try_from(k).map_err(|_| PyValueError::new_err(format!("k is {k}: 1 to {MAX_K} are possible")))?;
         let mut found = py.detach(|| self.0.nearest_all(queries, radii, k)).map_err(refused)?;
         roots(&mut found.distances2);
         let n = self.0.len() as u32;
@@ -75,11 +79,16 @@ impl Tree {
 
 /// The rows of `[n, 3]` as they lie in memory.
 fn rows<'a>(array: &'a PyReadonlyArray2<'_, f32>) -> PyResult<&'a [Vec3]> {
+    Ok(bytemuck::cast_slice(triples(array)?))
+}
+
+/// The same of any type.
+fn triples<'a, T: Element>(array: &'a PyReadonlyArray2<'_, T>) -> PyResult<&'a [[T; 3]]> {
     let [n, width] = [array.shape()[0], array.shape()[1]];
     if width != 3 {
-        return Err(PyValueError::new_err(format!("shape ({n}, {width}): three coordinates a point are needed")));
+        return Err(PyValueError::new_err(format!("shape ({n}, {width}): three numbers a row are needed")));
     }
-    Ok(bytemuck::cast_slice(array.as_slice()?))
+    Ok(array.as_slice()?.as_chunks().0)
 }
 
 /// One radius of each query, or a single one of all.
@@ -103,6 +112,10 @@ fn roots(squares: &mut [f32]) {
 mod _sunfleck {
     #[pymodule_export]
     use super::Tree;
+    #[pymodule_export]
+    use super::kd::{KdTree32, KdTree64};
+    #[pymodule_export]
+    use super::mesh::mesh_check;
     #[pymodule_export]
     const MAX_K: usize = super::MAX_K;
 }

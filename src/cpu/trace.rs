@@ -1,11 +1,16 @@
 //! Rays against the scene.
 
+use std::ops::ControlFlow;
+
 use glam::{Vec3, Vec3A, Vec4};
 
 use super::texture;
-use crate::layout::{self, PRIMITIVE_ALPHA, PRIMITIVE_INWARD, PRIMITIVE_SINGLE_SIDED, PRIMITIVE_SPHERE, Primitive};
+use crate::index::kd;
+use crate::layout::{
+    NONE, PRIMITIVE_ALPHA, PRIMITIVE_INWARD, PRIMITIVE_SINGLE_SIDED, PRIMITIVE_SPHERE, Primitive, SceneNode,
+};
 use crate::math::rng;
-use crate::scene::{PackedScene, bvh::MAX_DEPTH};
+use crate::scene::{PackedScene, SceneKd, bvh::MAX_DEPTH};
 
 /// Who follows a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,29 +55,86 @@ fn reciprocal(d: f32) -> f32 {
     1.0 / if d.abs() < 1e-20 { 1e-20f32.copysign(d) } else { d }
 }
 
-/// The nearest hit along the ray.
+/// Roundings of [`triangle`], for the kd-tree; [`MARGIN`](crate::scene::bvh::MARGIN) is the same for the BVH.
+const ROUNDINGS: f64 = 64.0;
+
+/// The nearest hit along the ray, and of several at the same t the one on the first primitive: it does not depend on the
+/// accelerator.
 pub fn nearest(scene: &PackedScene, ray: &Ray) -> Option<Hit> {
-    walk::<false>(scene, ray)
+    find::<false>(scene, ray)
 }
 
 /// Whether anything is hit at all.
 pub fn occluded(scene: &PackedScene, ray: &Ray) -> bool {
-    walk::<true>(scene, ray).is_some()
+    find::<true>(scene, ray).is_some()
+}
+
+/// What [`nearest`] finds, by a test of every primitive.
+pub fn nearest_of_all(scene: &PackedScene, ray: &Ray) -> Option<Hit> {
+    let mut best = Hit::none(ray);
+    for index in 0..scene.primitives.len() as u32 {
+        meet(scene, ray, index, &mut best);
+    }
+    best.found()
+}
+
+impl Hit {
+    fn none(ray: &Ray) -> Self {
+        Self { t: ray.t_max, primitive: NONE, u: 0.0, v: 0.0 }
+    }
+
+    fn is_some(&self) -> bool {
+        self.primitive != NONE
+    }
+
+    fn found(self) -> Option<Self> {
+        self.is_some().then_some(self)
+    }
 }
 
 #[inline]
-fn walk<const ANY: bool>(scene: &PackedScene, ray: &Ray) -> Option<Hit> {
-    if scene.nodes.is_empty() {
-        return None;
+fn find<const ANY: bool>(scene: &PackedScene, ray: &Ray) -> Option<Hit> {
+    let mut best = Hit::none(ray);
+    match &scene.kd {
+        None => walk::<ANY>(&scene.nodes, ray, &mut best, |slot, best| meet(scene, ray, slot, best)),
+        Some(kd) => through_planes::<ANY>(scene, kd, ray, &mut best),
+    }
+    best.found()
+}
+
+fn through_planes<const ANY: bool>(scene: &PackedScene, kd: &SceneKd, ray: &Ray, best: &mut Hit) {
+    walk::<ANY>(&kd.sphere_nodes, ray, best, |slot, best| {
+        if let Some(&index) = kd.spheres.get(slot as usize) {
+            meet(scene, ray, index, best);
+        }
+    });
+    if ANY && best.is_some() {
+        return;
+    }
+    // A ray that is not finite meets nothing.
+    let Ok(planes) = kd::Ray::new(ray.origin.to_array(), ray.direction.to_array()) else { return };
+    let _ = kd.triangles.try_faces(&planes.within(0.0, best.t), ROUNDINGS, |index| {
+        meet(scene, ray, index, best);
+        if ANY && best.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(best.t) }
+    });
+}
+
+/// Meets what the leaves on the way list, from near to far.
+#[inline]
+fn walk<const ANY: bool>(nodes: &[SceneNode], ray: &Ray, best: &mut Hit, meet: impl Fn(u32, &mut Hit)) {
+    if nodes.is_empty() {
+        return;
     }
     let origin = Vec3A::from(ray.origin);
     let inverse = Vec3A::new(reciprocal(ray.direction.x), reciprocal(ray.direction.y), reciprocal(ray.direction.z));
-    let mut best = Hit { t: ray.t_max, primitive: layout::NONE, u: 0.0, v: 0.0 };
+    let leaf = |(first, count): (u32, u32), best: &mut Hit| {
+        (first..first.saturating_add(count)).for_each(|slot| meet(slot, best))
+    };
     let mut stack = [(0u32, 0f32); MAX_DEPTH];
     let mut height = 0;
     let mut at = 0u32;
     loop {
-        let node: &[[f32; 4]; 4] = bytemuck::cast_ref(&scene.nodes[at as usize]);
+        let node: &[[f32; 4]; 4] = bytemuck::cast_ref(&nodes[at as usize]);
         let [l0, l1, r0, r1] = node.map(Vec4::from_array);
         let enter = |min: Vec4, max: Vec4| -> f32 {
             let t0 = (Vec3A::from_vec4(min) - origin) * inverse;
@@ -92,14 +154,14 @@ fn walk<const ANY: bool>(scene: &PackedScene, ray: &Ray) -> Option<Hit> {
         let mut next = None;
         if near < f32::INFINITY {
             if near_child.1 > 0 {
-                leaf(scene, ray, near_child, &mut best);
+                leaf(near_child, best);
             } else {
                 next = Some(near_child.0);
             }
         }
         if far < f32::INFINITY {
             if far_child.1 > 0 {
-                leaf(scene, ray, far_child, &mut best);
+                leaf(far_child, best);
             } else if next.is_some() {
                 stack[height] = (far_child.0, far);
                 height += 1;
@@ -107,14 +169,14 @@ fn walk<const ANY: bool>(scene: &PackedScene, ray: &Ray) -> Option<Hit> {
                 next = Some(far_child.0);
             }
         }
-        if ANY && best.primitive != layout::NONE {
-            break;
+        if ANY && best.is_some() {
+            return;
         }
         at = match next {
             Some(node) => node,
             None => loop {
                 if height == 0 {
-                    return (best.primitive != layout::NONE).then_some(best);
+                    return;
                 }
                 height -= 1;
                 if stack[height].1 <= best.t {
@@ -123,23 +185,25 @@ fn walk<const ANY: bool>(scene: &PackedScene, ray: &Ray) -> Option<Hit> {
             },
         };
     }
-    (best.primitive != layout::NONE).then_some(best)
 }
 
+/// Tests one primitive.
 #[inline]
-fn leaf(scene: &PackedScene, ray: &Ray, (first, count): (u32, u32), best: &mut Hit) {
-    for index in first..first + count {
-        let Some(primitive) = scene.primitives.get(index as usize) else { return };
-        let hit = if primitive.flags & PRIMITIVE_SPHERE == 0 {
-            triangle(primitive, ray, best.t)
-        } else {
-            sphere(primitive, ray, best.t)
-        };
-        let Some((t, u, v)) = hit else { continue };
-        let hit = Hit { t, primitive: index, u, v };
-        if primitive.flags & (PRIMITIVE_ALPHA | PRIMITIVE_SINGLE_SIDED) == 0 || is_there(scene, primitive, ray, &hit) {
-            *best = hit;
-        }
+fn meet(scene: &PackedScene, ray: &Ray, index: u32, best: &mut Hit) {
+    let Some(primitive) = scene.primitives.get(index as usize) else { return };
+    let hit = if primitive.flags & PRIMITIVE_SPHERE == 0 {
+        triangle(primitive, ray, best.t)
+    } else {
+        sphere(primitive, ray, best.t)
+    };
+    let Some((t, u, v)) = hit else { return };
+    // At the same t no order of the primitives but their own decides.
+    if t == best.t && (best.primitive == NONE || best.primitive <= index) {
+        return;
+    }
+    let hit = Hit { t, primitive: index, u, v };
+    if primitive.flags & (PRIMITIVE_ALPHA | PRIMITIVE_SINGLE_SIDED) == 0 || is_there(scene, primitive, ray, &hit) {
+        *best = hit;
     }
 }
 
@@ -165,7 +229,7 @@ fn triangle(p: &Primitive, ray: &Ray, t_max: f32) -> Option<(f32, f32, f32)> {
         return None;
     }
     let t = a.dot(normal) / slope;
-    (t > 0.0 && t < t_max).then(|| (t, u / sum, v / sum))
+    (t > 0.0 && t <= t_max).then(|| (t, u / sum, v / sum))
 }
 
 /// With the discriminant from the distance of the centre to the ray (Haines et al. 2019, "Precision Improvements for
@@ -186,7 +250,7 @@ fn sphere(p: &Primitive, ray: &Ray, t_max: f32) -> Option<(f32, f32, f32)> {
     if t0 > t1 {
         std::mem::swap(&mut t0, &mut t1);
     }
-    [t0, t1].into_iter().find(|&t| t > 0.0 && t < t_max).map(|t| (t, 0.0, 0.0))
+    [t0, t1].into_iter().find(|&t| t > 0.0 && t <= t_max).map(|t| (t, 0.0, 0.0))
 }
 
 #[cold]

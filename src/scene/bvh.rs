@@ -10,6 +10,10 @@ use crate::layout::{NONE, SceneNode};
 /// Deepest tree a traversal can walk: its stack holds one entry a level.
 pub const MAX_DEPTH: usize = 64;
 
+/// By how much boxes of nodes are larger than what is in them, in half-diagonals of the whole: more than the rounding of a
+/// test against a triangle, so that which primitives are hit, and where, does not depend on the tree.
+pub const MARGIN: f32 = 64.0 * f32::EPSILON;
+
 /// Nodes (the first is the root; empty without primitives) and the order in which leaves list the primitives.
 pub fn build(boxes: &[Aabb]) -> (Vec<SceneNode>, Vec<u32>) {
     if boxes.is_empty() {
@@ -18,9 +22,20 @@ pub fn build(boxes: &[Aabb]) -> (Vec<SceneNode>, Vec<u32>) {
     let tree = obvhs::bvh2::builder::build_bvh2(boxes, BvhBuildParams::medium_build(), &mut Duration::default());
     let mut flat = Flat::default();
     flat.root(&tree);
-    if flat.depth <= MAX_DEPTH {
-        return (flat.nodes, flat.order);
+    let (mut nodes, order) = if flat.depth <= MAX_DEPTH { (flat.nodes, flat.order) } else { halved(boxes) };
+    let margin = bounds(boxes).diagonal().length() * 0.5 * MARGIN;
+    for node in &mut nodes {
+        for corner in [&mut node.left_min, &mut node.right_min] {
+            *corner = corner.map(|x| x - margin);
+        }
+        for corner in [&mut node.left_max, &mut node.right_max] {
+            *corner = corner.map(|x| x + margin);
+        }
     }
+    (nodes, order)
+}
+
+fn halved(boxes: &[Aabb]) -> (Vec<SceneNode>, Vec<u32>) {
     // Agglomerative trees over adversarial input can be arbitrarily deep; halving by count never is.
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
     let mut nodes = vec![SceneNode::default()];
@@ -173,9 +188,7 @@ mod tests {
                 let (nodes, order) = build(&boxes);
                 if n > 0 {
                     assert!(check(&nodes, &order, &boxes) <= MAX_DEPTH);
-                    let mut order: Vec<u32> = (0..n as u32).collect();
-                    let mut nodes = vec![SceneNode::default()];
-                    halve(&boxes, &mut order, 0, &mut nodes, 0);
+                    let (nodes, order) = halved(&boxes);
                     assert!(check(&nodes, &order, &boxes) <= 16);
                 }
             }

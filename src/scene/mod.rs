@@ -326,11 +326,13 @@ pub mod check;
 pub mod defaults;
 mod environment;
 pub mod export;
+mod kd;
 pub mod load;
 mod packed;
 pub mod settings;
 pub mod shipped;
 
 pub use check::SceneError;
+pub use kd::{Accelerator, SceneKd};
 pub use packed::PackedScene;
 pub use settings::Settings;

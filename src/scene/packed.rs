@@ -1,10 +1,13 @@
 //! [`PackedScene`]: the only form a backend reads.
 
+use std::sync::Arc;
+
 use glam::{Vec2, Vec3, Vec3A, Vec4};
 use half::f16;
 use obvhs::aabb::Aabb;
 
-use super::{AlphaMode, PunctualKind, Scene, Texture, Wrap, albedo, bvh, environment};
+use super::{Accelerator, AlphaMode, PunctualKind, Scene, SceneKd, Texture, Wrap, albedo, bvh, environment};
+use crate::index::kd;
 use crate::layout::{self, NONE, Primitive, SceneInfo, SceneNode, TextureSlot, Vertex};
 
 /// Flat arrays and the tree over the primitives, in leaf order.
@@ -34,6 +37,8 @@ pub struct PackedScene {
     pub albedo: Vec<[f32; 2]>,
     /// Of the primitives: where each was among those of the scene.
     pub order: Vec<u32>,
+    /// What the CPU goes by instead of `nodes`, if it is there.
+    pub kd: Option<Arc<SceneKd>>,
 }
 
 impl PackedScene {
@@ -42,7 +47,7 @@ impl PackedScene {
         Self::pack(scene, None)
     }
 
-    /// The same. If all primitives are where they were in `before`, its tree is taken over: materials, lights and the
+    /// The same. If all primitives are where they were in `before`, its trees are taken over: materials, lights and the
     /// environment can change at little cost.
     pub fn new_after(before: &Self, scene: &Scene) -> Self {
         Self::pack(scene, Some(before))
@@ -59,6 +64,7 @@ impl PackedScene {
             None => bvh::build(&boxes),
         };
         packed.primitives = packed.order.iter().map(|&i| unordered[i as usize]).collect();
+        packed.kd = before.filter(|before| before.has_shapes(&packed.primitives)).and_then(|before| before.kd.clone());
 
         let bounds = bvh::bounds(&boxes);
         if !boxes.is_empty() {
@@ -69,6 +75,27 @@ impl PackedScene {
         packed.info.epsilon = 4e-6;
         packed.pack_lights(scene);
         packed
+    }
+
+    /// With another accelerator for the CPU, unless it has it already; a GPU does not mind. Fails as [`SceneKd::new`] does.
+    pub fn accelerated(mut self, by: Accelerator) -> Result<Self, kd::Error> {
+        self.kd = match (by, self.kd) {
+            (Accelerator::Bvh, _) => None,
+            (Accelerator::Kd, Some(kd)) => Some(kd),
+            (Accelerator::Kd, None) => Some(Arc::new(SceneKd::new(&self.primitives)?)),
+        };
+        Ok(self)
+    }
+
+    /// What the CPU goes by.
+    pub fn accelerator(&self) -> Accelerator {
+        if self.kd.is_some() { Accelerator::Kd } else { Accelerator::Bvh }
+    }
+
+    /// Whether the primitives are where these are. Equal boxes do not say it of triangles.
+    fn has_shapes(&self, primitives: &[Primitive]) -> bool {
+        let shape = |p: &Primitive| (p.a, p.b, p.c, p.flags & layout::PRIMITIVE_SPHERE);
+        self.primitives.iter().map(shape).eq(primitives.iter().map(shape))
     }
 
     /// Whether these are the boxes of the primitives, as they come from the scene.
@@ -324,7 +351,7 @@ fn pack_halves(a: f32, b: f32) -> u32 {
     u32::from(f16::from_f32(a).to_bits()) | u32::from(f16::from_f32(b).to_bits()) << 16
 }
 
-fn primitive_box(p: &Primitive) -> Aabb {
+pub(super) fn primitive_box(p: &Primitive) -> Aabb {
     let (a, b, c) = (Vec3A::from(p.a), Vec3A::from(p.b), Vec3A::from(p.c));
     if p.flags & layout::PRIMITIVE_SPHERE != 0 {
         // A little larger: the surface that intersection finds is rounded.
@@ -419,7 +446,8 @@ mod tests {
     #[test]
     fn a_tree_is_taken_over_where_it_is_the_same() {
         let mut scene = crate::scene::shipped::shipped("glass").expect("it is shipped");
-        let before = PackedScene::new(&scene);
+        let before = PackedScene::new(&scene).accelerated(Accelerator::Kd).expect("it has a kd-tree");
+        let planes = |of: &PackedScene| of.kd.as_ref().map(Arc::as_ptr);
         let same = |a: &PackedScene, b: &PackedScene| {
             assert!(a.nodes == b.nodes && a.primitives == b.primitives && a.materials == b.materials);
             assert!(a.lights == b.lights && a.info == b.info);
@@ -428,6 +456,7 @@ mod tests {
         scene.materials.last_mut().expect("it has some").roughness = 0.5;
         let after = PackedScene::new_after(&before, &scene);
         same(&after, &PackedScene::new(&scene));
+        assert_eq!(planes(&after), planes(&before));
         assert!(after.lights.len() > before.lights.len());
         // Something vanishes, something moves.
         scene.materials[0].alpha = AlphaMode::Mask(1.5);
@@ -436,7 +465,7 @@ mod tests {
         scene.meshes[0].positions[0] += 9.0;
         let moved = PackedScene::new_after(&before, &scene);
         same(&moved, &PackedScene::new(&scene));
-        assert!(moved.nodes != before.nodes);
+        assert!(moved.nodes != before.nodes && moved.kd.is_none());
     }
 
     #[test]

@@ -158,6 +158,10 @@ fn wrong_usage() {
         ("render floor.gltf -o a.png --kernel gauss", "epanechnikov"),
         ("render floor.gltf -o a.png --backend cpu --device 0", "--device 0"),
         ("render floor.gltf -o a.png --backend cpu --index hardware", "--index hardware"),
+        ("render floor.gltf -o a.png --backend gpu --accel kd", "--accel kd needs --backend cpu"),
+        ("render floor.gltf -o a.png --accel kd --device 0", "--device 0"),
+        ("render floor.gltf -o a.png --accel kd --index hardware", "--index hardware"),
+        ("render floor.gltf -o a.png --accel grid", "--accel"),
         ("render floor.gltf -o a.png -q -v", "--verbose"),
         ("render floor.gltf -o a.png --aplha 0.5", "--alpha"),
         ("render floor.gltf -o a.png --set nonsense", "--set nonsense"),
@@ -502,6 +506,25 @@ fn scenes_and_export() {
     assert!(output.status.success() && output.stderr.is_empty(), "{}", stderr(&output));
     assert_error(&sunfleck(folder.path(), words("export cornell -o box.obj")), 2, &[".glb"]);
     assert_error(&sunfleck(folder.path(), words("export absent.glb -o b.glb")), 1, &["absent.glb"]);
+}
+
+#[test]
+fn both_accelerators_make_the_same_picture() {
+    let folder = folder_with_floor();
+    let args = "render floor.gltf -r 32x16 --photons 2k --iterations 2 -v";
+    let render = |name: &str, options: &str| {
+        let output = sunfleck(folder.path(), words(&format!("{args} {options} -o {name}.exr --json {name}.json")));
+        assert!(output.status.success(), "{}", stderr(&output));
+        assert!(stderr(&output).contains(&format!("accelerator: {name}")), "{}", stderr(&output));
+        let report = std::fs::read_to_string(folder.path().join(format!("{name}.json"))).unwrap();
+        let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+        let device = &report["device"];
+        assert_eq!((device["backend"].as_str(), device["accelerator"].as_str()), (Some("cpu"), Some(name)));
+        output::exr::read(&folder.path().join(format!("{name}.exr"))).unwrap()
+    };
+    // Alone it chooses the CPU.
+    let difference = output::compare::compare(&render("kd", "--accel kd"), &render("bvh", "--backend cpu")).unwrap();
+    assert_eq!(difference.rel_mse, 0.0, "{difference:?}");
 }
 
 #[cfg(feature = "gpu")]

@@ -1,5 +1,7 @@
 //! Integration tests.
 
+#[cfg(feature = "render")]
+mod accelerators;
 #[cfg(all(feature = "render", feature = "gpu"))]
 mod backends;
 #[cfg(feature = "render")]

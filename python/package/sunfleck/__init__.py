@@ -1,8 +1,14 @@
-"""Neighbour search over points in three dimensions, much as `scipy.spatial.cKDTree` offers it.
+"""Neighbour search over points in three dimensions, rays against triangle meshes, and a check of such meshes.
 
-Coordinates and distances are in single precision: arrays of other types are converted, C-contiguous `float32` arrays are
-read where they lie. A point is within a radius when its distance is the radius or less. Searches run on all processors
-(`RAYON_NUM_THREADS` says how many) and let other Python threads run; do not change an array while it is being searched.
+`Index` searches points, much as `scipy.spatial.cKDTree` does. Its coordinates and distances are in single precision: arrays of
+other types are converted, C-contiguous `float32` arrays are read where they lie. A point is within a radius when its distance
+is the radius or less.
+
+`KdTree` finds what rays hit, in single or double precision; `mesh_check` says whether a mesh is closed and manifold, and which
+of its faces point inward.
+
+All run on all processors (`RAYON_NUM_THREADS` says how many) and let other Python threads run; do not change an array while it
+is being searched.
 """
 
 from __future__ import annotations
@@ -13,9 +19,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._arrays import numbers, triples
+from ._mesh import MeshReport, Shell, mesh_check
+from ._rays import KdTree
 from ._sunfleck import MAX_K, Tree
 
-__all__ = ["MAX_K", "Index"]
+__all__ = ["MAX_K", "Index", "KdTree", "MeshReport", "Shell", "mesh_check"]
 
 
 class Index:
@@ -88,33 +97,19 @@ class Index:
 
 def _rows(points: ArrayLike) -> NDArray[np.float32]:
     """`[n, 3]`, contiguous, in single precision: the same array if it is so already."""
-    array = _single(points)
-    if array.ndim == 1 and array.size == 0:
-        array = array.reshape(0, 3)
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise ValueError(f"shape {array.shape}: three coordinates a point are needed, [n, 3]")
-    return array
+    return triples(numbers(points, np.float32), "coordinates a point")
 
 
 def _queries(q: ArrayLike) -> tuple[NDArray[np.float32], bool]:
     """As `[m, 3]`, and whether it was a single one."""
-    array = _single(q)
+    array = numbers(q, np.float32)
     single = array.shape == (3,)
     return _rows(array.reshape(1, 3) if single else array), single
 
 
 def _radii(r: ArrayLike) -> tuple[NDArray[np.float32], bool]:
     """As an array, and whether there is one for each query."""
-    array = _single(r)
+    array = numbers(r, np.float32)
     if array.ndim > 1:
         raise ValueError(f"radii of shape {array.shape}: one is needed, or one for each query")
     return array.reshape(-1), array.ndim == 1
-
-
-def _single(values: ArrayLike) -> NDArray[np.float32]:
-    # What is too large becomes infinite, and is refused as such.
-    with np.errstate(over="ignore"):
-        array = np.asarray(values)
-        if array.dtype.kind not in "fiu" and array.size:
-            raise ValueError(f"numbers are needed, not {array.dtype}")
-        return np.require(array, dtype=np.float32, requirements=["C", "A"])

@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,3 +15,47 @@ class Tree:
     def nearest(
         self, queries: NDArray[np.float32], radii: NDArray[np.float32], each: bool, k: int
     ) -> tuple[NDArray[np.float32], NDArray[np.uint32]]: ...
+
+class KdTree32:
+    def __new__(
+        cls, vertices: NDArray[np.float32], faces: NDArray[np.uint32], builder: str, lazy: bool, parallel: bool
+    ) -> KdTree32: ...
+    def __len__(self) -> int: ...
+    @property
+    def nbytes(self) -> int | None: ...
+    def nearest(
+        self, origins: NDArray[np.float32], directions: NDArray[np.float32], min: NDArray[np.float32], max: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.float32]]: ...
+    def any(
+        self, origins: NDArray[np.float32], directions: NDArray[np.float32], min: NDArray[np.float32], max: NDArray[np.float32]
+    ) -> NDArray[np.bool_]: ...
+    def count(
+        self, origins: NDArray[np.float32], directions: NDArray[np.float32], min: NDArray[np.float32], max: NDArray[np.float32]
+    ) -> NDArray[np.uint32]: ...
+    def all(
+        self, origins: NDArray[np.float32], directions: NDArray[np.float32], min: NDArray[np.float32], max: NDArray[np.float32]
+    ) -> tuple[NDArray[np.uint64], NDArray[np.float32], NDArray[np.uint32], NDArray[np.float32]]: ...
+
+class KdTree64:
+    def __new__(
+        cls, vertices: NDArray[np.float64], faces: NDArray[np.uint32], builder: str, lazy: bool, parallel: bool
+    ) -> KdTree64: ...
+    def __len__(self) -> int: ...
+    @property
+    def nbytes(self) -> int | None: ...
+    def nearest(
+        self, origins: NDArray[np.float64], directions: NDArray[np.float64], min: NDArray[np.float64], max: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.uint32], NDArray[np.float64]]: ...
+    def any(
+        self, origins: NDArray[np.float64], directions: NDArray[np.float64], min: NDArray[np.float64], max: NDArray[np.float64]
+    ) -> NDArray[np.bool_]: ...
+    def count(
+        self, origins: NDArray[np.float64], directions: NDArray[np.float64], min: NDArray[np.float64], max: NDArray[np.float64]
+    ) -> NDArray[np.uint32]: ...
+    def all(
+        self, origins: NDArray[np.float64], directions: NDArray[np.float64], min: NDArray[np.float64], max: NDArray[np.float64]
+    ) -> tuple[NDArray[np.uint64], NDArray[np.float64], NDArray[np.uint32], NDArray[np.float64]]: ...
+
+def mesh_check(
+    vertices: NDArray[np.float64], faces: NDArray[np.uint32], intersections: bool, lazy: bool, parallel: bool
+) -> dict[str, Any]: ...

@@ -167,6 +167,10 @@ pub struct DeviceArgs {
     #[arg(long, value_parser = ["tree", "hardware"], default_value = "tree", help_heading = "Device")]
     pub index: String,
 
+    /// How the CPU finds what a ray meets: boxes or planes, the same picture; kd chooses the CPU
+    #[arg(long, value_parser = ["bvh", "kd"], default_value = "bvh", help_heading = "Device")]
+    pub accel: String,
+
     /// CPU threads [default: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Device")]
     pub threads: Option<u16>,

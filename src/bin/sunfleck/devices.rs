@@ -3,12 +3,12 @@
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Context as _, Result, anyhow, bail};
 use sunfleck::cpu::CpuStages;
 #[cfg(feature = "gpu")]
 use sunfleck::gpu::{self, Choice, Context, GpuStages, Method};
 use sunfleck::ppm::Stages;
-use sunfleck::scene::PackedScene;
+use sunfleck::scene::{Accelerator, PackedScene, Scene};
 
 use crate::cli::{DeviceArgs, Usage};
 use crate::job::Input;
@@ -16,7 +16,7 @@ use crate::progress::Progress;
 
 /// What will compute.
 pub enum Device {
-    Cpu,
+    Cpu(Accelerator),
     #[cfg(feature = "gpu")]
     Gpu(Arc<Context>, Method),
 }
@@ -29,15 +29,21 @@ pub fn use_threads(threads: Option<u16>) -> Result<()> {
 
 /// Opens what was asked for.
 pub fn open(args: &DeviceArgs, progress: &Progress) -> Result<Device> {
-    if args.backend != "cpu" {
-        return open_gpu(args, progress);
-    }
+    let accelerator = if args.accel == "kd" { Accelerator::Kd } else { Accelerator::Bvh };
+    let cpu = match accelerator {
+        Accelerator::Kd if args.backend == "gpu" => {
+            bail!(Usage("--accel kd needs --backend cpu, a GPU goes by its BVH".into()))
+        }
+        Accelerator::Kd => "--accel kd",
+        Accelerator::Bvh if args.backend == "cpu" => "--backend cpu",
+        Accelerator::Bvh => return open_gpu(args, progress),
+    };
     if args.index != "tree" {
-        bail!(Usage(format!("--index {} needs a GPU, --backend cpu does without", args.index)));
+        bail!(Usage(format!("--index {} needs a GPU, {cpu} does without", args.index)));
     }
     match &args.device {
-        Some(device) => bail!(Usage(format!("--device {device} names a GPU, --backend cpu does without"))),
-        None => Ok(Device::Cpu),
+        Some(device) => bail!(Usage(format!("--device {device} names a GPU, {cpu} does without"))),
+        None => Ok(Device::Cpu(accelerator)),
     }
 }
 
@@ -45,7 +51,7 @@ pub fn open(args: &DeviceArgs, progress: &Progress) -> Result<Device> {
 #[cfg(feature = "gpu")]
 pub fn open_backend(name: &str) -> Result<Device> {
     Ok(match name {
-        "cpu" => Device::Cpu,
+        "cpu" => Device::Cpu(Accelerator::Bvh),
         "gpu-hardware" => Device::Gpu(Arc::new(Context::with_ray_queries(&Choice::Any)?), Method::Hardware),
         _ => Device::Gpu(Arc::new(Context::new(&Choice::Any)?), Method::Tree),
     })
@@ -55,7 +61,7 @@ pub fn open_backend(name: &str) -> Result<Device> {
 #[cfg(not(feature = "gpu"))]
 pub fn open_backend(name: &str) -> Result<Device> {
     match name {
-        "cpu" => Ok(Device::Cpu),
+        "cpu" => Ok(Device::Cpu(Accelerator::Bvh)),
         _ => bail!("this sunfleck was built without the GPU backend"),
     }
 }
@@ -72,7 +78,7 @@ pub fn has_real_gpu() -> bool {
 fn open_gpu(args: &DeviceArgs, _: &Progress) -> Result<Device> {
     match args.backend == "gpu" || args.device.is_some() || args.index != "tree" {
         true => bail!("this sunfleck was built without the GPU backend"),
-        false => Ok(Device::Cpu),
+        false => Ok(Device::Cpu(Accelerator::Bvh)),
     }
 }
 
@@ -87,7 +93,7 @@ fn open_gpu(args: &DeviceArgs, progress: &Progress) -> Result<Device> {
         }
         None if args.backend == "gpu" => Choice::Any,
         None if devices.iter().any(gpu::DeviceInfo::is_real) || method == Method::Hardware => Choice::Real,
-        None => return Ok(Device::Cpu),
+        None => return Ok(Device::Cpu(Accelerator::Bvh)),
     };
     let opened = match method {
         Method::Tree => Context::new(&choice),
@@ -98,7 +104,7 @@ fn open_gpu(args: &DeviceArgs, progress: &Progress) -> Result<Device> {
         // Nobody asked for a GPU, and there is something else.
         Err(error) if choice == Choice::Real && method == Method::Tree => {
             progress.say(&format!("sunfleck: warning: {error}; using the CPU"));
-            Ok(Device::Cpu)
+            Ok(Device::Cpu(Accelerator::Bvh))
         }
         Err(error) => Err(error.into()),
     }
@@ -108,7 +114,7 @@ impl Device {
     /// `cpu` or `gpu`.
     pub fn backend(&self) -> &'static str {
         match self {
-            Self::Cpu => "cpu",
+            Self::Cpu(_) => "cpu",
             #[cfg(feature = "gpu")]
             Self::Gpu(..) => "gpu",
         }
@@ -117,9 +123,18 @@ impl Device {
     /// `tree` or `hardware`.
     pub fn index(&self) -> String {
         match self {
-            Self::Cpu => "tree".to_owned(),
+            Self::Cpu(_) => "tree".to_owned(),
             #[cfg(feature = "gpu")]
             Self::Gpu(_, method) => method.to_string(),
+        }
+    }
+
+    /// What finds what a ray meets.
+    pub fn accelerator(&self) -> Accelerator {
+        match self {
+            Self::Cpu(accelerator) => *accelerator,
+            #[cfg(feature = "gpu")]
+            Self::Gpu(..) => Accelerator::Bvh,
         }
     }
 
@@ -127,7 +142,7 @@ impl Device {
     #[cfg(feature = "view")]
     pub fn is_lost(&self) -> bool {
         match self {
-            Self::Cpu => false,
+            Self::Cpu(_) => false,
             Self::Gpu(context, _) => context.check().is_err(),
         }
     }
@@ -136,7 +151,7 @@ impl Device {
     #[cfg(feature = "view")]
     pub fn reopen(&self) -> Result<Self> {
         Ok(match self {
-            Self::Cpu => Self::Cpu,
+            Self::Cpu(accelerator) => Self::Cpu(*accelerator),
             Self::Gpu(context, method) => {
                 let choice = Choice::Index(context.info().index);
                 let context = match method {
@@ -151,18 +166,27 @@ impl Device {
     /// What the adapter is called, if this is one.
     pub fn gpu_name(&self) -> Option<String> {
         match self {
-            Self::Cpu => None,
+            Self::Cpu(_) => None,
             #[cfg(feature = "gpu")]
             Self::Gpu(context, _) => Some(context.info().to_string()),
         }
     }
 
-    /// Takes the scene to the device.
-    pub fn stages(&self, input: &Input) -> Result<Box<dyn Stages>> {
-        self.stages_of(Arc::new(PackedScene::new(&input.scene)), input, None)
+    /// The scene as it is computed with. `before` is the same with other materials and lights, perhaps.
+    pub fn pack(&self, scene: &Scene, before: Option<&PackedScene>) -> Result<Arc<PackedScene>> {
+        let packed = match before {
+            Some(before) => PackedScene::new_after(before, scene),
+            None => PackedScene::new(scene),
+        };
+        Ok(Arc::new(packed.accelerated(self.accelerator()).context("no kd-tree over this scene")?))
     }
 
-    /// The same with the scene packed already. A dispatch on a graphics card is to take `dispatch_seconds` at most.
+    /// Takes the scene to the device.
+    pub fn stages(&self, input: &Input) -> Result<Box<dyn Stages>> {
+        self.stages_of(self.pack(&input.scene, None)?, input, None)
+    }
+
+    /// The same with a scene of [`Device::pack`]. A dispatch on a graphics card is to take `dispatch_seconds` at most.
     pub fn stages_of(
         &self,
         scene: Arc<PackedScene>,
@@ -172,7 +196,7 @@ impl Device {
         let params = &input.params;
         let camera = input.camera.pack(params.size[0], params.size[1]);
         Ok(match self {
-            Self::Cpu => Box::new(CpuStages::new(scene, camera, params.film_size())),
+            Self::Cpu(_) => Box::new(CpuStages::new(scene, camera, params.film_size())),
             #[cfg(feature = "gpu")]
             Self::Gpu(context, method) => {
                 let mut stages = GpuStages::with_method(Arc::clone(context), &scene, camera, *method)?;

@@ -121,6 +121,7 @@ impl<'a> Run<'a> {
                 backend: device.backend(),
                 name: stages.device(),
                 index: device.index(),
+                accelerator: device.accelerator().to_string(),
                 threads: rayon::current_num_threads(),
             },
             end: End::Failed,
@@ -306,8 +307,11 @@ impl<'a> Run<'a> {
             ),
             format!("camera: {:?}, {width}x{height} pixels", input.camera.name),
             format!(
-                "device: {} ({}), index: {}",
-                self.report.device.name, self.report.device.backend, self.report.device.index
+                "device: {} ({}), index: {}, accelerator: {}",
+                self.report.device.name,
+                self.report.device.backend,
+                self.report.device.index,
+                self.report.device.accelerator,
             ),
             format!("photons: {} paths an iteration, alpha {:.4}, {:?}", params.n_paths, params.alpha, params.kernel),
             format!(

@@ -92,6 +92,8 @@ pub struct Device {
     pub name: String,
     /// What finds the photons: `tree` or `hardware`.
     pub index: String,
+    /// What finds what a ray meets: `bvh` or `kd`.
+    pub accelerator: String,
     /// Threads of the CPU.
     pub threads: usize,
 }

@@ -25,6 +25,7 @@
 mod cell;
 mod clip;
 mod events;
+mod faces;
 mod lazy;
 mod mesh;
 mod quadratic;
@@ -37,6 +38,7 @@ mod walk;
 
 use std::ops::ControlFlow;
 
+pub use faces::FaceTree;
 pub use lazy::LazyKd;
 pub use mesh::Triangles;
 pub use query::{EveryTriangle, RaySearch};
@@ -151,6 +153,11 @@ impl<T: Scalar> KdTree<T> {
     /// Of the tree alone, without the mesh.
     pub fn bytes(&self) -> usize {
         self.tree.bytes()
+    }
+
+    /// The tree alone, its faces called what `name` says.
+    pub fn into_faces(self, name: impl Fn(u32) -> u32) -> FaceTree {
+        FaceTree::new(self.triangles.frame, self.tree, name)
     }
 
     /// The mesh again.

@@ -111,6 +111,11 @@ impl Tree {
         self.items.extend_from_slice(&other.items);
     }
 
+    /// Calls each triangle what `name` says.
+    pub(super) fn rename(&mut self, name: impl Fn(u32) -> u32) {
+        self.items.iter_mut().for_each(|face| *face = name(*face));
+    }
+
     /// Whether indices fit into a node.
     pub(super) fn fits(&self) -> bool {
         self.nodes.len() < 1 << 30 && u32::try_from(self.items.len()).is_ok()

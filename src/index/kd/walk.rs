@@ -8,6 +8,7 @@
 use std::borrow::Borrow;
 use std::ops::ControlFlow;
 
+use super::mesh::Frame;
 use super::{Hit, Ray, Scalar, Triangles};
 
 /// How nodes are reached.
@@ -26,7 +27,7 @@ pub enum Opened<Id, Items> {
 
 /// Rounding of the corners to single precision, in the frame: half of this a coordinate.
 const ROUNDING: f64 = 1.0 / (1u64 << 23) as f64;
-/// Roundings that a test of a triangle makes, at most: half of this.
+/// Roundings that [`Ray::hit`] makes, at most: half of this.
 const ROUNDINGS: f64 = 16.0;
 /// What is shorter, against the longest, moves a ray by nothing while it is in the box.
 const STILL: f64 = 1.0 / (1u128 << 80) as f64;
@@ -43,12 +44,12 @@ struct Framed {
 }
 
 impl Framed {
-    fn new<T: Scalar>(ray: &Ray<T>, triangles: &Triangles<T>) -> Self {
-        let origin = triangles.frame.place(ray.origin);
-        let direction = ray.direction.map(|x| x.into() * triangles.frame.scale);
+    fn new<T: Scalar>(ray: &Ray<T>, frame: &Frame, roundings: f64) -> Self {
+        let origin = frame.place(ray.origin);
+        let direction = ray.direction.map(|x| x.into() * frame.scale);
         let longest = direction.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         let far = origin.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-        let near = ROUNDING + ROUNDINGS * T::EPSILON * (1.0 + far);
+        let near = ROUNDING + roundings * T::EPSILON * (1.0 + far);
         let inverse = direction.map(|x| if x.abs() <= longest * STILL { 0.0 } else { 1.0 / x });
         Self { origin, inverse, near, pad: inverse.map(|x| x.abs() * near) }
     }
@@ -79,8 +80,27 @@ pub fn hits<T: Scalar, N: Nodes, B>(
     ray: &Ray<T>,
     mut visit: impl FnMut(Hit<T>) -> ControlFlow<B, T>,
 ) -> ControlFlow<B> {
-    let framed = Framed::new(ray, triangles);
-    let Some((from, to)) = framed.range(triangles.frame.half) else {
+    let mut limit = ray.max;
+    faces(nodes, &triangles.frame, ROUNDINGS, ray, |face| {
+        if let Some(hit) = ray.hit(face, triangles.corners(face)) {
+            limit = visit(hit)?;
+        }
+        ControlFlow::Continue(limit)
+    })
+}
+
+/// Calls `visit` with every triangle that a test making up to `roundings` / 2 roundings can find hit, from near to far, cell by
+/// cell; with most of them in vain, and several times with one that is in several cells. It says up to which t it wants more.
+#[inline]
+pub fn faces<T: Scalar, N: Nodes, B>(
+    nodes: N,
+    frame: &Frame,
+    roundings: f64,
+    ray: &Ray<T>,
+    mut visit: impl FnMut(u32) -> ControlFlow<B, T>,
+) -> ControlFlow<B> {
+    let framed = Framed::new(ray, frame, roundings);
+    let Some((from, to)) = framed.range(frame.half) else {
         return ControlFlow::Continue(());
     };
     let mut limit: f64 = ray.max.into();
@@ -121,10 +141,7 @@ pub fn hits<T: Scalar, N: Nodes, B>(
                 }
                 Opened::Leaf(faces) => {
                     for face in faces {
-                        let face = *face.borrow();
-                        if let Some(hit) = ray.hit(face, triangles.corners(face)) {
-                            limit = visit(hit)?.into();
-                        }
+                        limit = visit(*face.borrow())?.into();
                     }
                     break;
                 }

@@ -45,7 +45,7 @@ impl Backends {
         let mut all = Vec::new();
         for device in &self.0 {
             match device {
-                Device::Cpu => all.extend(cpu(points)),
+                Device::Cpu(_) => all.extend(cpu(points)),
                 #[cfg(feature = "gpu")]
                 Device::Gpu(context, method) => all.push(gpu::entrant(context, *method, points)?),
             }

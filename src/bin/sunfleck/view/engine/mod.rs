@@ -235,6 +235,8 @@ pub struct Engine {
     shared: Arc<Shared>,
     /// What searches the photons: `tree` or `hardware`.
     index: String,
+    /// What finds what a ray meets: `bvh` or `kd`.
+    accelerator: String,
     threads: Vec<JoinHandle<()>>,
 }
 
@@ -242,19 +244,24 @@ impl Engine {
     /// Starts the threads; `wake` is called from them.
     pub fn start(device: Device, wake: Wake) -> std::io::Result<Self> {
         let shared = Arc::new(Shared { board: Mutex::default(), changed: Condvar::new(), wake });
-        let index = device.index();
+        let (index, accelerator) = (device.index(), device.accelerator().to_string());
         let named = |name: &str| std::thread::Builder::new().name(name.to_owned());
         let (render, paint) = (Arc::clone(&shared), Arc::clone(&shared));
         let threads = vec![
             named("render").spawn(move || worker::run(&render, device))?,
             named("paint").spawn(move || painting::run(&paint))?,
         ];
-        Ok(Self { shared, index, threads })
+        Ok(Self { shared, index, accelerator, threads })
     }
 
     /// What searches the photons: `tree` or `hardware`.
     pub fn index(&self) -> &str {
         &self.index
+    }
+
+    /// What finds what a ray meets: `bvh` or `kd`.
+    pub fn accelerator(&self) -> &str {
+        &self.accelerator
     }
 
     /// Says what is wanted from now on.

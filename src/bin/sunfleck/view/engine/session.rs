@@ -100,11 +100,7 @@ impl Session {
         input: Input,
         before: Option<&PackedScene>,
     ) -> Result<Self> {
-        let scene = match before {
-            Some(before) => PackedScene::new_after(before, &input.scene),
-            None => PackedScene::new(&input.scene),
-        };
-        let scene = Arc::new(scene);
+        let scene = device.pack(&input.scene, before)?;
         let stages = device.stages_of(Arc::clone(&scene), &input, Some(DISPATCH_SECONDS))?;
         let params = input.params.clone();
         Ok(Self {

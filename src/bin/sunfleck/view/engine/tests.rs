@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 use sunfleck::cpu::CpuStages;
 use sunfleck::output::exr;
 use sunfleck::ppm::{self, Film, Stages};
-use sunfleck::scene::PackedScene;
 use sunfleck::scene::settings::CameraSettings;
+use sunfleck::scene::{Accelerator, PackedScene};
 
 use super::*;
 use crate::cli::InputArgs;
@@ -25,7 +25,7 @@ struct Bench {
 impl Bench {
     /// Opens a small picture of a scene, with limits.
     fn open(name: &str, limits: Limits) -> Self {
-        Self::open_on(Device::Cpu, name, limits)
+        Self::open_on(Device::Cpu(Accelerator::Bvh), name, limits)
     }
 
     fn open_on(device: Device, name: &str, limits: Limits) -> Self {

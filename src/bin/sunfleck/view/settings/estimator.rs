@@ -40,6 +40,11 @@ const INDEX: Name = Name {
     hint: "What finds the photons near a point: sunfleck's own tree, or the ray tracing hardware of a graphics card. \
            Chosen at the start: sunfleck view --index tree|hardware.",
 };
+const ACCELERATOR: Name = Name {
+    name: "Accelerator",
+    hint: "What finds the surface a ray meets: a tree of boxes (bvh), or of planes (kd, on the CPU). The picture is the same. \
+           Chosen at the start: sunfleck view --accel bvh|kd.",
+};
 
 pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     let now = &*viewer.settings();
@@ -125,6 +130,7 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
         };
         ui.add(egui::Label::new(text).truncate())
     });
+    row(ui, ACCELERATOR, false, |ui| ui.add(egui::Label::new(viewer.engine().accelerator()).truncate()));
 }
 
 fn radius(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, now: &Settings) {

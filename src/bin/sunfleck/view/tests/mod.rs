@@ -61,7 +61,7 @@ impl Window {
             output: None,
             reference: None,
         };
-        let engine = Engine::start(Device::Cpu, Arc::new(|| {})).unwrap();
+        let engine = Engine::start(Device::Cpu(sunfleck::scene::Accelerator::Bvh), Arc::new(|| {})).unwrap();
         let mut viewer = Viewer::new(None, engine, Arc::new(|| {}), first);
         let asked = Arc::new(Mutex::new(vec![]));
         let (noted, place) = (Arc::clone(&asked), folder.path().to_owned());
