@@ -60,7 +60,7 @@ def main():
         write(given, *read_obj(args.mesh))
         meshes = {args.mesh.stem: given, "sphere": meshes["sphere"]}
 
-    lines, missing = [], {}
+    lines, missing, report = [], {}, {}
     for number in range(1, args.rounds + 1):
         for name, path in meshes.items():
             turned = folder / f"{name}-turned.mesh"
@@ -79,18 +79,18 @@ def main():
                         missing[entrant] = error
                     else:
                         lines.append(found | {"mesh": f"{name}, {n_faces:,} faces", "task": task, "entrant": entrant})
-    report = {
-        "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="minutes"),
-        "command": " ".join([os.path.relpath(__file__), *sys.argv[1:]]),
-        "device": run.device(),
-        "rounds": args.rounds,
-        "versions": {"sunfleck": versions["sunfleck"]} | installed(args.python),
-        "missing": missing,
-        "disagreements": check(lines),
-        "measurements": lines,
-    }
-    args.output.parent.mkdir(parents=True, exist_ok=True)
-    args.output.write_text(json.dumps(report, indent=1) + "\n")
+        report = {
+            "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="minutes"),
+            "command": " ".join([os.path.relpath(__file__), *sys.argv[1:]]),
+            "device": run.device(),
+            "rounds": number,
+            "versions": {"sunfleck": versions["sunfleck"]} | installed(args.python),
+            "missing": missing,
+            "disagreements": check(lines),
+            "measurements": lines,
+        }
+        args.output.parent.mkdir(parents=True, exist_ok=True)
+        args.output.write_text(json.dumps(report, indent=1) + "\n")
     print(markdown(report))
     return 1 if report["disagreements"] else 0
 

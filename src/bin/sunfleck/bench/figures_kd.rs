@@ -14,6 +14,7 @@ pub const NAMES: [&str; 7] =
     ["figure7-2", "figure7-3", "figure7-4", "figure7-5", "figure7-6", "figure7-7", "figure7-8"];
 
 /// A line of a plot, a column of a table.
+#[derive(Clone)]
 struct Line {
     name: String,
     algorithm: Algorithm,
@@ -40,12 +41,10 @@ impl Line {
     }
 }
 
-/// Of the check, built `how`; and of the prebuilt tree.
+/// Of the check, built `how`; and of the prebuilt tree. The first are those of [`builds`], so that they have its colours.
 fn checks(how: Operation) -> Vec<Line> {
-    let trees = TREES.map(|algorithm| Line::new(algorithm, how));
-    let mut lines = vec![Line::new(NO_TREE, Operation::Check)];
-    lines.extend(trees);
-    lines.push(Line::new(BEST, Operation::Rays));
+    let mut lines = TREES.map(|algorithm| Line::new(algorithm, how)).to_vec();
+    lines.extend([Line::new(BEST, Operation::Rays), Line::new(NO_TREE, Operation::Check)]);
     lines
 }
 
@@ -123,22 +122,17 @@ const BUSY: [(Operation, &str); 3] =
     [(Operation::Build, "build"), (Operation::Lazy, "check, lazily"), (Operation::Rays, "rays, prebuilt")];
 
 fn draw_utilisation(path: &std::path::Path, mesh: &str, cells: &[Cell]) -> Result<()> {
-    let at = |operation, faces| {
-        let found = Line::new(BEST, operation).cells(cells, mesh, true);
-        found.into_iter().find(|c| c.faces == faces).and_then(Cell::utilisation).map_or(f64::NAN, |share| 100.0 * share)
-    };
-    let sizes = Line::new(BEST, Operation::Build).cells(cells, mesh, true);
-    let groups = sizes.iter().map(|c| {
-        let bars = BUSY.map(|(operation, name)| (name.to_owned(), vec![at(operation, c.faces)]));
-        (short(c.faces), bars.into())
+    let panels = BUSY.map(|(operation, name)| {
+        let percent = |c: &Cell| c.utilisation().map_or(f64::NAN, |share| 100.0 * share);
+        let bar = |c: &Cell| (short(c.faces), vec![(BEST.name.to_owned(), vec![percent(c)])]);
+        Bars {
+            title: name.to_owned(),
+            y: "% of the threads' time",
+            parts: vec!["busy"],
+            groups: Line::new(BEST, operation).cells(cells, mesh, true).into_iter().map(bar).collect(),
+        }
     });
-    let bars = Bars {
-        title: format!("{}, by faces", BEST.name),
-        y: "% of the threads' time",
-        parts: vec!["busy"],
-        groups: groups.collect(),
-    };
-    plot::bars(path, &title(FIGURE_7, mesh, true), &[bars], 1)
+    plot::bars(path, &title(FIGURE_7, mesh, true), &panels, panels.len())
 }
 
 pub fn print(machine: &Machine, mesh: &str, cells: &[Cell], left_out: Option<&str>) {

@@ -244,7 +244,10 @@ pub fn bars(path: &Path, title: &str, panels: &[Bars], columns: usize) -> Result
                     drawn.iter().filter(|d| d.0 == colour).map(|d| Rectangle::new(d.2, style.mix(d.1).filled())),
                 )
                 .map_err(failed)?
-                .label(format!("{name}: {} from below", panel.parts.join(", ")))
+                .label(match &panel.parts[..] {
+                    [_] => (*name).to_owned(),
+                    parts => format!("{name}: {} from below", parts.join(", ")),
+                })
                 .legend(move |(x, y)| Rectangle::new([(x, y - 5), (x + 12, y + 5)], style.filled()));
         }
         let plane = chart.plotting_area();
