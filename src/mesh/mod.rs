@@ -15,11 +15,14 @@
 //! ```
 
 mod check;
+mod collapse;
 mod crossings;
+pub mod generate;
 pub mod io;
 pub mod orientation;
 mod overlaps;
 mod report;
+pub mod resize;
 mod topology;
 
 pub use check::{CheckOptions, check};

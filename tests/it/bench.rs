@@ -122,6 +122,10 @@ fn what_makes_no_sense_is_refused_in_one_line() {
         ("photons --rounds 3", 2, "--rounds"),
         ("indices --case all", 2, "camera"),
         ("indices --quick -o file/deeper", 1, "file/deeper"),
+        ("kd --faces 0", 2, "between 1"),
+        ("kd --levels 10", 2, "--levels"),
+        ("kd --mesh nothing.obj", 1, "nothing.obj"),
+        ("kd --mesh file", 1, "file"),
         ("nothing", 2, "nothing"),
     ] {
         let output = bench(folder.path(), args);
@@ -227,6 +231,49 @@ fn one_case_only() {
     let args = "--rounds 1 --samples 500 --queries 100 --case nearest";
     let (_, rows) = rows(folder.path(), "indices", args, &["indices"]);
     assert_eq!(distinct(&rows, "case"), HashSet::from(["nearest"]));
+}
+
+const KD_FIGURES: [&str; 7] =
+    ["figure7-2", "figure7-3", "figure7-4", "figure7-5", "figure7-6", "figure7-7", "figure7-8"];
+
+#[test]
+fn kd_measures_every_builder_in_every_way() {
+    let folder = tempfile::tempdir().unwrap();
+    let (text, rows) = rows(folder.path(), "kd", "--rounds 1 --faces 300,501 --levels 1,2", &KD_FIGURES);
+    // No tree; three builders: build, and check both ways; rays alone. On one thread, and on all.
+    assert_eq!(rows.len(), 4 * 2 * (1 + 3 * 3 + 1));
+    assert_eq!(distinct(&rows, "algorithm"), HashSet::from(["no tree", "O(N²)", "O(N log² N)", "O(N log N)"]));
+    assert_eq!(distinct(&rows, "operation"), HashSet::from(["build", "check", "lazy", "rays"]));
+    let faces = |mesh: &str| -> HashSet<u64> {
+        rows.iter().filter(|r| r["mesh"] == mesh).map(|r| r["faces"].as_u64().unwrap()).collect()
+    };
+    assert_eq!(faces("asteroid"), HashSet::from([300, 502]));
+    assert_eq!(faces("sphere"), HashSet::from([80, 320]));
+    for row in &rows {
+        assert_times(row, "time");
+        assert_eq!(row["treeBytes"].is_u64(), row["algorithm"] != "no tree", "{row}");
+        #[cfg(unix)]
+        assert!(number(row, "utilisation") > 0.0, "{row}");
+    }
+    for figure in ["7.2", "7.3", "7.4", "7.5", "7.6", "7.7", "7.8"] {
+        assert!(text.contains(&format!("Figure {figure}: ")), "{figure}");
+    }
+    assert!(text.contains("Ryzen") && text.contains("slope") && !text.contains("left out"));
+}
+
+#[test]
+fn kd_scales_a_mesh_of_the_users() {
+    let folder = tempfile::tempdir().unwrap();
+    let corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
+    // One face is turned: that is no error, for the mesh is as it is.
+    fs::write(folder.path().join("wedge.obj"), format!("{corners}f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 4 1\n")).unwrap();
+    let args = "--rounds 1 --faces 20000 --levels 0 --mesh wedge.obj";
+    let (text, rows) = rows(folder.path(), "kd", args, &KD_FIGURES);
+    assert_eq!(distinct(&rows, "mesh"), HashSet::from(["wedge", "sphere"]));
+    // Quadratic time is not spent on so many.
+    let of_wedge: Vec<Value> = rows.into_iter().filter(|r| r["mesh"] == "wedge").collect();
+    assert_eq!(distinct(&of_wedge, "algorithm"), HashSet::from(["O(N log² N)", "O(N log N)"]));
+    assert!(text.contains("above 14744 faces they are left out"), "{text}");
 }
 
 /// The CPU's search checks the GPU's: other totals are an error.

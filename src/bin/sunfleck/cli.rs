@@ -86,7 +86,7 @@ pub enum Command {
     #[command(after_help = "relMSE is the mean over pixels and channels of (x - y)² / (y² + 0.01); \
         the trimmed one leaves out the worst 0.1 % of the pixels.")]
     Compare(CompareArgs),
-    /// Make the evaluation of the neighbour search again: figures and tables
+    /// Make the evaluations of the neighbour search and of the kd-tree again: figures and tables
     Bench(crate::bench::BenchArgs),
     /// Geometry tasks on point clouds: normals, correspondence, registration
     Points(points::PointsArgs),

@@ -1,10 +1,17 @@
 //! A cell on its way to become a node: its triangles, each with the box of its part in the cell.
 
+use rayon::prelude::*;
+
 use super::clip::{Aabb, clip};
 use super::events::Events;
 use super::quadratic;
 use super::sah::{Cheapest, Plane, Sah};
-use super::{Builder, Triangles};
+use super::{Builder, KdOptions, Triangles};
+
+/// What is below cells of so many triangles is built by several threads.
+pub const PARALLEL: usize = 4096;
+/// Triangles that one thread divides at a time.
+const PIECE: usize = 4096;
 
 /// A triangle, and the box of what the cell leaves of it.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +24,7 @@ pub struct Part {
 #[derive(Debug)]
 pub struct Task {
     sah: Sah,
+    pub parallel: bool,
     /// In the frame.
     corners: Vec<[[f32; 3]; 3]>,
 }
@@ -51,7 +59,7 @@ pub enum Node {
 }
 
 /// What a plane makes of the triangles of a cell.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Halves {
     pub parts: [Vec<Part>; 2],
     /// For each triangle of the cell its place in the half that it is in, or [`CUT`].
@@ -68,20 +76,25 @@ pub const CUT: Place = u32::MAX;
 pub const ABOVE: Place = 1 << 31;
 
 impl Task {
-    pub fn new<T: super::Scalar>(triangles: &Triangles<T>, sah: Sah) -> Self {
-        Self { sah, corners: triangles.framed() }
+    pub fn new<T: super::Scalar>(triangles: &Triangles<T>, options: &KdOptions) -> Self {
+        let parallel = options.parallel && triangles.len() >= PARALLEL;
+        Self { sah: options.sah, parallel, corners: triangles.framed(parallel) }
     }
 
     /// The whole mesh.
     pub fn root(&self, builder: Builder) -> Cell {
-        let boxes = self.corners.iter().map(|corners| corners.iter().fold(Aabb::NOTHING, |b, &p| b.with(p)));
-        let parts: Vec<_> = boxes.zip(0..).map(|(bounds, face)| Part { face, bounds }).collect();
+        let part = |(face, corners): (usize, &[[f32; 3]; 3])| Part { face: face as u32, bounds: Aabb::of(corners) };
+        let parts: Vec<_> = if self.parallel {
+            self.corners.par_iter().enumerate().map(part).collect()
+        } else {
+            self.corners.iter().enumerate().map(part).collect()
+        };
         let bounds = parts.iter().fold(Aabb::NOTHING, |b, part| b.with(part.bounds.min).with(part.bounds.max));
         let search = match builder {
             Builder::None => Search::None,
             Builder::Quadratic => Search::Quadratic,
             Builder::SortEachNode => Search::SortEachNode,
-            Builder::SortOnce => Search::SortOnce(Events::of(&parts)),
+            Builder::SortOnce => Search::SortOnce(Events::of(&parts, self.parallel)),
         };
         Cell { bounds, depth: 0, parts, search }
     }
@@ -93,28 +106,42 @@ impl Cell {
         self.parts.len()
     }
 
-    /// Splits it, or makes it a leaf.
-    pub fn open(self, task: &Task) -> Node {
-        let Some(plane) = self.plane(&task.sah) else {
+    /// Whether there are fewer cells like it than threads in rayon's pool, so that several of them should open it.
+    pub fn is_wide(&self) -> bool {
+        self.len() >= PARALLEL && 1usize << self.depth.min(31) < rayon::current_num_threads()
+    }
+
+    /// A triangle, below [`Cell::len`]; they are in rising order.
+    pub fn face(&self, index: usize) -> Option<u32> {
+        self.parts.get(index).map(|part| part.face)
+    }
+
+    /// Splits it, or makes it a leaf: `parallel` on all threads of rayon's pool, with the same outcome.
+    pub fn open(&self, task: &Task, parallel: bool) -> Node {
+        let Some(plane) = self.plane(&task.sah, parallel) else {
             return Node::Leaf(self.parts.iter().map(|part| part.face).collect());
         };
-        let Self { bounds, depth, parts, search } = self;
-        let cells = bounds.cut(plane.axis, plane.at);
-        let halves = divide(parts, &plane, &cells, &task.corners);
-        let searches = match search {
+        let cells = self.bounds.cut(plane.axis, plane.at);
+        let halves = if parallel {
+            let pieces = self.parts.par_chunks(PIECE).map(|parts| divide(parts, &plane, &cells, &task.corners));
+            pieces.reduce(Halves::default, Halves::and)
+        } else {
+            divide(&self.parts, &plane, &cells, &task.corners)
+        };
+        let searches = match &self.search {
             Search::None => [Search::None, Search::None],
             Search::Quadratic => [Search::Quadratic, Search::Quadratic],
             Search::SortEachNode => [Search::SortEachNode, Search::SortEachNode],
-            Search::SortOnce(events) => events.divide(&halves).map(Search::SortOnce),
+            Search::SortOnce(events) => events.divide(&halves, parallel).map(Search::SortOnce),
         };
         let [below, above] = halves.parts;
-        let child = |bounds, parts, search| Cell { bounds, depth: depth + 1, parts, search };
+        let child = |bounds, parts, search| Cell { bounds, depth: self.depth + 1, parts, search };
         let ([cell_below, cell_above], [search_below, search_above]) = (cells, searches);
         let children = Box::new([child(cell_below, below, search_below), child(cell_above, above, search_above)]);
         Node::Inner { axis: plane.axis, at: plane.at, children }
     }
 
-    fn plane(&self, sah: &Sah) -> Option<Plane> {
+    fn plane(&self, sah: &Sah, parallel: bool) -> Option<Plane> {
         if self.depth >= sah.max_depth {
             return None;
         }
@@ -122,21 +149,23 @@ impl Cell {
         match &self.search {
             Search::None => {}
             Search::Quadratic => quadratic::offer(&self.parts, &mut cheapest),
-            Search::SortEachNode => Events::of(&self.parts).offer(self.parts.len(), &mut cheapest),
-            Search::SortOnce(events) => events.offer(self.parts.len(), &mut cheapest),
+            Search::SortEachNode => {
+                Events::of(&self.parts, parallel).offer(self.parts.len(), &mut cheapest, parallel);
+            }
+            Search::SortOnce(events) => events.offer(self.parts.len(), &mut cheapest, parallel),
         }
         cheapest.worth(self.parts.len())
     }
 }
 
 /// Who is where. Triangles that the plane cuts are clipped again, to both halves; the others keep their boxes.
-fn divide(parts: Vec<Part>, plane: &Plane, cells: &[Aabb; 2], corners: &[[[f32; 3]; 3]]) -> Halves {
+fn divide(parts: &[Part], plane: &Plane, cells: &[Aabb; 2], corners: &[[[f32; 3]; 3]]) -> Halves {
     let mut halves = Halves {
         parts: [(); 2].map(|()| Vec::with_capacity(parts.len())),
         places: Vec::with_capacity(parts.len()),
         cut: [Vec::new(), Vec::new()],
     };
-    for part in parts {
+    for &part in parts {
         let (min, max) = (part.bounds.min[plane.axis], part.bounds.max[plane.axis]);
         let planar = min == plane.at && max == plane.at;
         if planar || max <= plane.at || min >= plane.at {
@@ -155,4 +184,22 @@ fn divide(parts: Vec<Part>, plane: &Plane, cells: &[Aabb; 2], corners: &[[[f32; 
         }
     }
     halves
+}
+
+impl Halves {
+    /// Of the triangles of both, these first.
+    fn and(mut self, other: Self) -> Self {
+        let counts = [0, 1].map(|half| self.parts[half].len() as u32);
+        self.places.extend(other.places.iter().map(|&place| match place {
+            CUT => CUT,
+            _ => place + counts[usize::from(place & ABOVE != 0)],
+        }));
+        for (half, other) in self.parts.iter_mut().zip(&other.parts) {
+            half.extend_from_slice(other);
+        }
+        for ((half, other), count) in self.cut.iter_mut().zip(&other.cut).zip(counts) {
+            half.extend(other.iter().map(|index| index + count));
+        }
+        self
+    }
 }

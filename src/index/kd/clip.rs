@@ -30,6 +30,11 @@ impl Aabb {
         self
     }
 
+    /// Around a triangle.
+    pub fn of(corners: &[[f32; 3]; 3]) -> Self {
+        corners.iter().fold(Self::NOTHING, |b, &p| b.with(p))
+    }
+
     /// The parts below and above a plane.
     pub fn cut(self, axis: usize, at: f32) -> [Self; 2] {
         let (mut below, mut above) = (self, self);
@@ -50,7 +55,7 @@ const NONE: Corner = Corner { at: [0.0; 3], cut: false };
 
 /// The box of the triangle's part in the cell; nothing if there is none.
 pub fn clip(triangle: &[[f32; 3]; 3], cell: &Aabb) -> Option<Aabb> {
-    let whole = triangle.iter().fold(Aabb::NOTHING, |b, &p| b.with(p));
+    let whole = Aabb::of(triangle);
     let (mut polygon, mut other) = ([NONE; MOST], [NONE; MOST]);
     let mut n = 3;
     for (corner, p) in polygon.iter_mut().zip(triangle) {

@@ -4,6 +4,8 @@
 //! are on one side, which leaves them in order; only those of triangles that the plane cuts are made anew, sorted, and
 //! merged in. They are few: O(√N) of N.
 
+use rayon::prelude::*;
+
 use super::cell::{ABOVE, CUT, Halves, Part};
 use super::sah::{Cheapest, Counts};
 
@@ -16,6 +18,9 @@ const PLANAR: u64 = 1;
 const START: u64 = 2;
 const INDEX_BITS: u32 = 30;
 const INDEX: u64 = (1 << INDEX_BITS) - 1;
+
+/// Events that one thread sweeps or divides at a time.
+const PIECE: usize = 1 << 13;
 
 /// The events of a cell: one sorted list, axis by axis.
 #[derive(Debug)]
@@ -56,64 +61,129 @@ fn push(part: &Part, index: u64, axis: usize, into: &mut Vec<Event>) {
     }
 }
 
+/// What an axis gives, for each.
+fn axes<R: Send>(parallel: bool, run: impl Fn(usize) -> R + Sync) -> [R; 3] {
+    if parallel {
+        let (x, (y, z)) = rayon::join(|| run(0), || rayon::join(|| run(1), || run(2)));
+        [x, y, z]
+    } else {
+        [run(0), run(1), run(2)]
+    }
+}
+
 impl Events {
     /// Of all triangles of a cell.
-    pub fn of(parts: &[Part]) -> Self {
-        Self(std::array::from_fn(|axis| {
+    pub fn of(parts: &[Part], parallel: bool) -> Self {
+        Self(axes(parallel, |axis| {
             let mut events = Vec::with_capacity(2 * parts.len());
             for (part, index) in parts.iter().zip(0..) {
                 push(part, index, axis, &mut events);
             }
-            events.sort_unstable();
+            if parallel {
+                events.par_sort_unstable();
+            } else {
+                events.sort_unstable();
+            }
             events
         }))
     }
 
     /// Every place where something begins or ends, with the counts there. `n` triangles are in the cell.
-    pub fn offer(&self, n: usize, cheapest: &mut Cheapest<'_>) {
-        for (axis, events) in self.0.iter().enumerate() {
-            let (mut below, mut above) = (0, n);
-            let mut events = events.iter().copied().peekable();
-            while let Some(first) = events.next() {
-                let at = first >> 32;
-                let (mut ending, mut planar, mut starting) = (0, 0, 0);
-                let mut next = Some(first);
-                while let Some(e) = next {
-                    ending += usize::from(kind(e) == END);
-                    planar += usize::from(kind(e) == PLANAR);
-                    starting += usize::from(kind(e) == START);
-                    next = events.next_if(|e| e >> 32 == at);
-                }
-                above -= ending + planar;
-                cheapest.offer(axis, place(first), Counts { below, planar, above });
-                below += starting + planar;
+    pub fn offer(&self, n: usize, cheapest: &mut Cheapest<'_>, parallel: bool) {
+        if parallel {
+            let of_axes = axes(true, |axis| sweep_beside(&self.0[axis], axis, (0, n), cheapest));
+            of_axes.iter().for_each(|other| cheapest.join(other));
+        } else {
+            for (axis, events) in self.0.iter().enumerate() {
+                sweep(events, axis, (0, n), cheapest);
             }
         }
     }
 
     /// The events of both halves.
-    pub fn divide(self, halves: &Halves) -> [Self; 2] {
-        let mut divided = [Self(Default::default()), Self(Default::default())];
-        for (axis, events) in self.0.into_iter().enumerate() {
-            let mut lists = [&halves.parts[0], &halves.parts[1]].map(|parts| Vec::with_capacity(2 * parts.len()));
-            for &e in &events {
-                let place = halves.places[(e & INDEX) as usize];
-                if place != CUT {
-                    lists[usize::from(place & ABOVE != 0)].push(e & !INDEX | u64::from(place & !ABOVE));
-                }
-            }
-            for (half, mut list) in lists.into_iter().enumerate() {
+    pub fn divide(&self, halves: &Halves, parallel: bool) -> [Self; 2] {
+        let [x, y, z] = axes(parallel, |axis| {
+            let lists = if parallel {
+                let pieces = self.0[axis].par_chunks(PIECE).map(|piece| divide(piece, halves, piece.len()));
+                pieces.reduce(Default::default, |[mut below, mut above], [more_below, more_above]| {
+                    below.extend_from_slice(&more_below);
+                    above.extend_from_slice(&more_above);
+                    [below, above]
+                })
+            } else {
+                divide(&self.0[axis], halves, usize::MAX)
+            };
+            let mut half = 0;
+            lists.map(|mut list| {
                 let mut new = Vec::with_capacity(2 * halves.cut[half].len());
                 for &index in &halves.cut[half] {
                     push(&halves.parts[half][index as usize], u64::from(index), axis, &mut new);
                 }
                 new.sort_unstable();
                 merge(&mut list, &new);
-                divided[half].0[axis] = list;
-            }
-        }
-        divided
+                half += 1;
+                list
+            })
+        });
+        let ([x, x_above], [y, y_above], [z, z_above]) = (x, y, z);
+        [Self([x, y, z]), Self([x_above, y_above, z_above])]
     }
+}
+
+/// Offers every place in a list of events, before which `below` triangles have begun and behind which `above` end.
+fn sweep(events: &[Event], axis: usize, (mut below, mut above): (usize, usize), cheapest: &mut Cheapest<'_>) {
+    let mut events = events.iter().copied().peekable();
+    while let Some(first) = events.next() {
+        let at = first >> 32;
+        let (mut ending, mut planar, mut starting) = (0, 0, 0);
+        let mut next = Some(first);
+        while let Some(e) = next {
+            ending += usize::from(kind(e) == END);
+            planar += usize::from(kind(e) == PLANAR);
+            starting += usize::from(kind(e) == START);
+            next = events.next_if(|e| e >> 32 == at);
+        }
+        above -= ending + planar;
+        cheapest.offer(axis, place(first), Counts { below, planar, above });
+        below += starting + planar;
+    }
+}
+
+/// The same on several threads: the second half of the list is swept from the counts at its beginning.
+fn sweep_beside<'a>(
+    events: &[Event],
+    axis: usize,
+    (below, above): (usize, usize),
+    cheapest: &Cheapest<'a>,
+) -> Cheapest<'a> {
+    // Events of one place stay together.
+    let middle = events.get(events.len() / 2).map_or(0, |m| events.partition_point(|e| e >> 32 < m >> 32));
+    if events.len() <= PIECE || middle == 0 {
+        let mut cheapest = cheapest.clone();
+        sweep(events, axis, (below, above), &mut cheapest);
+        return cheapest;
+    }
+    let (first, second) = events.split_at(middle);
+    let begun = first.iter().filter(|&&e| kind(e) != END).count();
+    let ended = first.iter().filter(|&&e| kind(e) != START).count();
+    let (mut best, other) = rayon::join(
+        || sweep_beside(first, axis, (below, above), cheapest),
+        || sweep_beside(second, axis, (below + begun, above - ended), cheapest),
+    );
+    best.join(&other);
+    best
+}
+
+/// Events of triangles that are on one side, renumbered, each list in order. At most `most` are in one.
+fn divide(events: &[Event], halves: &Halves, most: usize) -> [Vec<Event>; 2] {
+    let mut lists = [&halves.parts[0], &halves.parts[1]].map(|parts| Vec::with_capacity(most.min(2 * parts.len())));
+    for &e in events {
+        let place = halves.places[(e & INDEX) as usize];
+        if place != CUT {
+            lists[usize::from(place & ABOVE != 0)].push(e & !INDEX | u64::from(place & !ABOVE));
+        }
+    }
+    lists
 }
 
 /// Merges one sorted list into another, from behind.

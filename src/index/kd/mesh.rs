@@ -1,5 +1,7 @@
 //! The triangles a tree is built over.
 
+use rayon::prelude::*;
+
 use super::{Error, Scalar};
 
 /// More cannot be numbered in an event.
@@ -102,9 +104,11 @@ impl<T: Scalar> Triangles<T> {
     }
 
     /// The corners in the frame, in single precision: what is built over.
-    pub(super) fn framed(&self) -> Vec<[[f32; 3]; 3]> {
+    pub(super) fn framed(&self, parallel: bool) -> Vec<[[f32; 3]; 3]> {
         // −0 becomes 0, so that the order of the bits is that of the numbers.
         let place = |p| self.frame.place(p).map(|x| x as f32 + 0.0);
-        (0..self.len() as u32).map(|face| self.corners(face).map(place)).collect()
+        let corners = |face| self.corners(face).map(place);
+        let faces = 0..self.len() as u32;
+        if parallel { faces.into_par_iter().map(corners).collect() } else { faces.map(corners).collect() }
     }
 }

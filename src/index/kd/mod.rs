@@ -3,7 +3,7 @@
 //! Four builders ([`Builder`]) emit one [`KdTree`]; the three real ones emit the same tree, plane by plane. The build takes
 //! the surface area heuristic with split candidates from triangles clipped to the cell, and tries planar triangles on both
 //! sides (Wald & Havran 2006, "On building fast kd-Trees for Ray Tracing, and on doing that in O(N log N)"). [`LazyKd`]
-//! builds what rays reach. Queries ([`RaySearch`]) are watertight, in single or double precision.
+//! builds what rays reach, or grows beside them. Queries ([`RaySearch`]) are watertight, in single or double precision.
 //!
 //! # Precision
 //!
@@ -104,7 +104,7 @@ pub struct KdOptions {
     pub builder: Builder,
     /// What a split costs.
     pub sah: Sah,
-    /// Whether to build on all threads of rayon's pool: the same tree, too.
+    /// Whether to build, or to grow, on all threads of rayon's pool: the same tree, too.
     pub parallel: bool,
 }
 
@@ -133,7 +133,7 @@ impl<T: Scalar> KdTree<T> {
     /// Builds the whole tree.
     pub fn new(triangles: Triangles<T>, options: &KdOptions) -> Result<Self, Error> {
         options.sah.check()?;
-        let task = Task::new(&triangles, options.sah);
+        let task = Task::new(&triangles, options);
         let tree = Tree::build(task.root(options.builder), &task, options.parallel);
         Self::of(triangles, tree)
     }

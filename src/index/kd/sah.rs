@@ -54,6 +54,7 @@ pub struct Counts {
 
 /// Keeps the cheapest plane. Of planes that cost the same it is the one of the first axis, then the lowest, then planar
 /// triangles below it: so the order in which they are offered does not matter.
+#[derive(Clone)]
 pub struct Cheapest<'a> {
     sah: &'a Sah,
     cell: &'a Aabb,
@@ -108,6 +109,13 @@ impl<'a> Cheapest<'a> {
         };
         if self.best.is_none_or(|(best_cost, best)| before(cost, plane, best, best_cost)) {
             self.best = Some((cost, plane));
+        }
+    }
+
+    /// Also those that were offered to another.
+    pub fn join(&mut self, other: &Self) {
+        if let Some((cost, plane)) = other.best {
+            self.consider(cost, plane);
         }
     }
 

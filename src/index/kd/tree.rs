@@ -3,11 +3,9 @@
 //! Nodes are in the order of a walk that goes below first: the child below stands behind its parent, and the parent says
 //! where the one above is. A parallel build makes parts of that order and joins them, so it gives the same tree.
 
-use super::cell::{Cell, Node, Task};
+use super::cell::{Cell, Node, PARALLEL, Task};
 use super::walk::{Nodes, Opened};
 
-/// Cells of so many triangles are built beside each other.
-const PARALLEL: usize = 4096;
 const LEAF: u32 = 3;
 
 /// An inner node has the plane's place and, above two bits of axis, the child above. A leaf has its first item and, above
@@ -33,49 +31,78 @@ impl Tree {
     pub fn build(cell: Cell, task: &Task, parallel: bool) -> Self {
         let mut tree = Self::default();
         tree.push(cell, task, parallel);
-        tree.nodes.shrink_to_fit();
-        tree.items.shrink_to_fit();
-        tree
+        tree.shrunk()
+    }
+
+    /// Without room for more.
+    pub(super) fn shrunk(mut self) -> Self {
+        self.nodes.shrink_to_fit();
+        self.items.shrink_to_fit();
+        self
+    }
+
+    /// The same, of a cell that is open.
+    pub(super) fn of(node: Node, task: &Task) -> Self {
+        let mut tree = Self::default();
+        tree.push_node(node, task, false);
+        tree.shrunk()
     }
 
     fn push(&mut self, cell: Cell, task: &Task, parallel: bool) {
-        match cell.open(task) {
-            Node::Leaf(faces) => self.push_leaf(&faces),
+        let parallel = parallel && cell.len() >= PARALLEL;
+        let node = cell.open(task, parallel && cell.is_wide());
+        drop(cell);
+        self.push_node(node, task, parallel);
+    }
+
+    fn push_node(&mut self, node: Node, task: &Task, parallel: bool) {
+        match node {
+            Node::Leaf(faces) => {
+                self.nodes.push(Packed { at: self.items.len() as u32, link: (faces.len() as u32) << 2 | LEAF });
+                self.items.extend(faces);
+            }
             Node::Inner { axis, at, children } => {
                 let [below, above] = *children;
-                let node = self.push_inner(axis, at);
-                if parallel && below.len() + above.len() >= PARALLEL {
-                    let mut other = Self::default();
-                    rayon::join(|| self.push(below, task, true), || other.push(above, task, true));
-                    self.set_above(node);
-                    self.append(&other);
-                } else {
-                    self.push(below, task, false);
-                    self.set_above(node);
-                    self.push(above, task, false);
-                }
+                self.push_both(
+                    (axis, at),
+                    parallel,
+                    |tree| tree.push(below, task, parallel),
+                    |tree| tree.push(above, task, parallel),
+                );
             }
         }
     }
 
-    pub(super) fn push_leaf(&mut self, faces: &[u32]) {
-        self.nodes.push(Packed { at: self.items.len() as u32, link: (faces.len() as u32) << 2 | LEAF });
-        self.items.extend_from_slice(faces);
-    }
-
-    /// Its index, for [`Tree::set_above`].
-    pub(super) fn push_inner(&mut self, axis: usize, at: f32) -> usize {
+    /// An inner node with what is below its plane and above it, `parallel` beside each other.
+    pub(super) fn push_both(
+        &mut self,
+        (axis, at): (usize, f32),
+        parallel: bool,
+        below: impl FnOnce(&mut Self) + Send,
+        above: impl FnOnce(&mut Self) + Send,
+    ) {
+        let node = self.nodes.len();
         self.nodes.push(Packed { at: at.to_bits(), link: axis as u32 });
-        self.nodes.len() - 1
+        if parallel {
+            let mut other = Self::default();
+            rayon::join(|| below(self), || above(&mut other));
+            self.set_above(node);
+            self.append(&other);
+        } else {
+            below(self);
+            self.set_above(node);
+            above(self);
+        }
     }
 
     /// The next node is the child above of this one.
-    pub(super) fn set_above(&mut self, node: usize) {
+    fn set_above(&mut self, node: usize) {
         let next = self.nodes.len() as u32;
         self.nodes[node].link |= next << 2;
     }
 
-    fn append(&mut self, other: &Self) {
+    /// Puts another behind this, whose next node is its root.
+    pub(super) fn append(&mut self, other: &Self) {
         let (nodes, items) = (self.nodes.len() as u32, self.items.len() as u32);
         self.nodes.extend(other.nodes.iter().map(|&Packed { at, link }| match link & 3 {
             LEAF => Packed { at: at + items, link },

@@ -5,6 +5,7 @@
 //! than all of these together, and a ray visits both sides where it is that near. So every triangle that [`Ray::hit`]
 //! finds is found, and rays in a plane, along one or with zero components are no special case.
 
+use std::borrow::Borrow;
 use std::ops::ControlFlow;
 
 use super::mesh::Frame;
@@ -13,7 +14,7 @@ use super::{Hit, Ray, Scalar, Triangles};
 /// How nodes are reached.
 pub trait Nodes: Copy {
     type Id: Copy;
-    type Items: AsRef<[u32]>;
+    type Items: IntoIterator<Item: Borrow<u32>>;
     fn root(self) -> Self::Id;
     fn open(self, node: Self::Id) -> Opened<Self::Id, Self::Items>;
 }
@@ -139,8 +140,8 @@ pub fn faces<T: Scalar, N: Nodes, B>(
                     }
                 }
                 Opened::Leaf(faces) => {
-                    for &face in faces.as_ref() {
-                        limit = visit(face)?.into();
+                    for face in faces {
+                        limit = visit(*face.borrow())?.into();
                     }
                     break;
                 }

@@ -1,5 +1,6 @@
 //! kd-trees over triangles.
 
+mod growing;
 pub mod meshes;
 mod queries;
 mod trees;

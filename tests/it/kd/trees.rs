@@ -52,7 +52,7 @@ fn nothing_is_missing<T: Scalar>(tree: &KdTree<T>, r: &mut Random, n: usize, wha
 #[test]
 fn builders_give_one_tree_and_miss_nothing() {
     let mut inner = 0;
-    for seed in 0..16 {
+    for seed in 0..24 {
         for kind in 0..N_KINDS {
             let (soup, name) = random(kind, seed, 60);
             let what = format!("{name}, seed {seed}");
@@ -80,6 +80,46 @@ fn builders_give_one_tree_of_an_icosphere() {
     // A tenth of the 350 MB of the thesis at 140,296 faces.
     let bytes = tree.bytes() as f64 / tree.triangles().len() as f64;
     assert!(bytes < 249.0, "{bytes} bytes a triangle");
+}
+
+/// The same over meshes of one's own: OBJ files named by `SUNFLECK_MESHES`, with spaces between. All their faces by the two fast
+/// builders, every so manieth face by all: the O(N²) one has its limits.
+#[test]
+#[ignore = "needs meshes, and a minute"]
+fn builders_give_one_tree_of_meshes_at_hand() {
+    const MOST: usize = 20_000;
+    let paths = std::env::var("SUNFLECK_MESHES").expect("SUNFLECK_MESHES names OBJ files");
+    for path in paths.split_whitespace() {
+        let (vertices, faces) = obj(&std::fs::read_to_string(path).unwrap());
+        let some = faces.iter().copied().step_by(faces.len().div_ceil(MOST)).collect();
+        let tree = one_tree::<f64>(&(vertices.clone(), some), Sah::default(), path);
+        println!("{path}: all builders, {} faces, {} nodes", tree.triangles().len(), tree.nodes().count());
+        let soup = (vertices, faces);
+        for parallel in [false, true] {
+            let options = |builder| KdOptions { builder, parallel, ..KdOptions::default() };
+            let [once, each] =
+                [REAL[2], REAL[1]].map(|builder| KdTree::new(mesh::<f64>(&soup), &options(builder)).unwrap());
+            assert!(once.nodes().eq(each.nodes()), "{path}");
+            nothing_is_missing(&once, &mut Random::new(8), 200, path);
+            println!("{path}: the two fast ones, {} faces, {} nodes", soup.1.len(), once.nodes().count());
+        }
+    }
+}
+
+fn obj(text: &str) -> Soup {
+    let mut soup: Soup = (Vec::new(), Vec::new());
+    for line in text.lines() {
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some("v") => soup.0.push([(); 3].map(|()| words.next().unwrap().parse().unwrap())),
+            Some("f") => soup.1.push([(); 3].map(|()| {
+                let index: u32 = words.next().unwrap().split('/').next().unwrap().parse().unwrap();
+                index - 1
+            })),
+            _ => {}
+        }
+    }
+    soup
 }
 
 /// The root's plane against a search written from the definition, on whole triangles.
@@ -220,6 +260,8 @@ fn a_lazy_tree_grows_where_rays_go_and_only_once() {
     });
     let grown = lazy.n_opened();
     assert!(grown > first && grown <= eager.nodes().count());
+    lazy.grow().unwrap();
+    assert_eq!(lazy.n_opened(), eager.nodes().count());
     assert!(lazy.finish().unwrap().nodes().eq(eager.nodes()));
 }
 

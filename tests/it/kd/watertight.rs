@@ -1,5 +1,6 @@
 //! No ray slips through an edge or a corner.
 
+use rayon::prelude::*;
 use sunfleck::index::kd::{KdOptions, KdTree, Ray, RaySearch, Scalar};
 
 use super::meshes::{Random, Soup, icosphere, mesh, point};
@@ -41,20 +42,27 @@ fn no_ray_leaves_a_sphere() {
     assert_eq!(misses(&single, n, &mut Random::new(2)), 0, "single precision");
 }
 
-/// The same with 10⁸ rays in each precision: `cargo test --release -- --ignored --nocapture no_ray_of_many`.
+/// Rays of a long test: `SUNFLECK_RAYS`, or `otherwise`.
+fn n_rays(otherwise: usize) -> usize {
+    std::env::var("SUNFLECK_RAYS").map_or(otherwise, |n| n.parse().expect("SUNFLECK_RAYS is a number"))
+}
+
+/// The same with 10⁸ rays in each precision.
 #[test]
 #[ignore = "minutes"]
 fn no_ray_of_many_leaves_a_sphere() {
-    let (level, n, parts) = (7, 100_000_000, 1000);
+    let (level, n, part) = (7, n_rays(100_000_000), 10_000);
     let double = KdTree::new(mesh::<f64>(&sphere(level)), &KdOptions::default()).unwrap();
     let single = KdTree::new(mesh::<f32>(&sphere(level)), &KdOptions::default()).unwrap();
-    let (mut missed, mut missed_single) = (0, 0);
-    for part in 0..parts {
-        missed += misses(&double, n / parts, &mut Random::new(2 * part as u32));
-        missed_single += misses(&single, n / parts, &mut Random::new(2 * part as u32 + 1));
-    }
-    println!("{n} rays: {missed} missed in double precision, {missed_single} in single");
-    assert_eq!((missed, missed_single), (0, 0));
+    let parts = n.div_ceil(part) as u32;
+    let missed = |misses: &(dyn Fn(&mut Random) -> usize + Sync), odd: u32| -> usize {
+        (0..parts).into_par_iter().map(|part| misses(&mut Random::new(2 * part + odd))).sum()
+    };
+    let in_double = missed(&|r| misses(&double, part, r), 0);
+    println!("{} rays in double precision: {in_double} missed", parts as usize * part);
+    let in_single = missed(&|r| misses(&single, part, r), 1);
+    println!("{} rays in single precision: {in_single} missed", parts as usize * part);
+    assert_eq!((in_double, in_single), (0, 0));
 }
 
 /// The test of the thesis: a ray from anywhere through a point of a face hits that face. Number of misses.
@@ -82,7 +90,8 @@ fn a_ray_through_a_point_of_a_face_hits_the_face() {
 #[test]
 #[ignore = "minutes"]
 fn ten_million_rays_through_points_of_faces_hit_them() {
-    let missed = missed_faces(7, 10_000_000, 2);
-    println!("10⁷ rays: {missed} missed");
+    let n = n_rays(10_000_000);
+    let missed = missed_faces(7, n, 2);
+    println!("{n} rays through points of faces: {missed} missed");
     assert_eq!(missed, 0);
 }

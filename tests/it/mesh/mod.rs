@@ -1,7 +1,8 @@
-//! Triangle meshes: their check.
+//! Triangle meshes: how they are made, and their check.
 
 mod faults;
 mod files;
+mod generate;
 mod intersections;
 mod orientation;
 #[cfg(feature = "render")]

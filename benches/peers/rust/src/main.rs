@@ -1,7 +1,8 @@
 //! `generate FOLDER` writes the data; `run LIBRARY LIMIT POINTS CASE...` measures one library, a JSON line a case.
-//! A case is `name,queries,radius,k`, k = 0 for the kernel sum; `LIMIT` cuts the queries, 0 does not.
+//! A case is `name,queries,radius,k`, k = 0 for the kernel sum; `LIMIT` cuts the queries, 0 does not. `mesh`: see mesh.rs.
 
 mod data;
+mod mesh;
 mod peers;
 
 use std::path::Path;
@@ -33,7 +34,9 @@ fn main() -> Result<()> {
                 _ => bail!("no library {library}"),
             }
         }
-        _ => bail!("generate FOLDER | run LIBRARY LIMIT POINTS CASE..."),
+        ["mesh", "write", folder] => mesh::write(Path::new(folder)),
+        ["mesh", "run", what, path] => mesh::run(what, path),
+        _ => bail!("generate FOLDER | run LIBRARY LIMIT POINTS CASE... | mesh write FOLDER | mesh run WHAT FILE"),
     }
 }
 

@@ -1,5 +1,5 @@
 //! `sunfleck bench`: the evaluation of Evangelou, Papaioannou, Vardis & Vasilakis 2021, "Fast Radius Search Exploiting
-//! Ray-Tracing Frameworks" (JCGT 10(1)), made again on the machine at hand.
+//! Ray-Tracing Frameworks" (JCGT 10(1)), made again on the machine at hand; `bench kd` that of a thesis on kd-trees.
 //!
 //! What each figure and table of the paper shows, and where ours departs from it, is said in the module that makes it.
 //! Common to all of them: the paper timed OptiX 7.2 against the GPU version of FLANN on an RTX 2080 Ti; here the library's
@@ -13,8 +13,10 @@
 mod backends;
 mod contest;
 mod entrants;
+mod figures_kd;
 mod gathers;
 mod indices;
+mod kd;
 mod measure;
 mod paper;
 mod photons;
@@ -23,6 +25,7 @@ mod points;
 mod report;
 mod search;
 mod sorted;
+mod thesis;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -45,6 +48,8 @@ Examples:
 
   sunfleck bench photons --iterations 5 -o results
       The paper's Table 1 on this machine; its 50 iterations take hours without a GPU.
+  sunfleck bench kd --mesh eros.obj -o results
+      Builders of kd-trees in the mesh check, over a mesh split and simplified from 1,000 to 140,296 faces.
 
 Into the folder go NAME.json, NAME.csv and an .svg for each figure; the tables are printed too.";
 
@@ -66,6 +71,8 @@ enum Benchmark {
     Photons(photons::PhotonsArgs),
     /// The library's indices and build options side by side
     Indices(indices::IndicesArgs),
+    /// kd-trees over triangles in the mesh check (Figures 7.2 to 7.8 of the thesis on them)
+    Kd(kd::KdArgs),
 }
 
 /// Of the benchmarks that search on several devices.
@@ -91,7 +98,7 @@ struct Common {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
 
-    /// Of the random points
+    /// Of the random points, and of the asteroid
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u32,
 
@@ -113,6 +120,7 @@ pub fn run(args: &BenchArgs) -> Result<ExitCode> {
         Benchmark::Points(args) => points::run(args)?,
         Benchmark::Photons(args) => photons::run(args)?,
         Benchmark::Indices(args) => indices::run(args)?,
+        Benchmark::Kd(args) => kd::run(args)?,
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -111,7 +111,8 @@ fn exposure(ui: &mut Ui, viewer: &mut Viewer) {
     if changed {
         look.exposure = is_given.then_some((shown * 10.0).round() / 10.0);
     }
-    let mut stops = f64::from(look.exposure.unwrap_or(shown));
+    // Rounded as it is shown, so that nothing is −0.0; a picture's own brightness has more digits.
+    let mut stops = (f64::from(look.exposure.unwrap_or(shown)) * 10.0).round() / 10.0 + 0.0;
     row(ui, STOPS, false, |ui| {
         let response = slider(ui, &mut stops, -10.0..=10.0, |slider| slider.fixed_decimals(1).suffix(" EV"));
         if response.changed() {
