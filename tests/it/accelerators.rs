@@ -84,7 +84,7 @@ fn leaves() -> Scene {
     };
     let leaf = |alpha| Material {
         alpha,
-        base_color_texture: Some(texture.clone()),
+        base_color_texture: Some(texture),
         double_sided: true,
         ..Material::diffuse("leaf", Vec3::splat(0.8))
     };
