@@ -233,13 +233,15 @@ fn broken_files_say_where() {
     }
 }
 
+type Reads = Box<dyn Fn(&[u8]) -> Option<Loaded>>;
+
 /// Any bytes changed, cut off or repeated: an answer, and never an index out of range.
 #[test]
 fn mutated_files_do_no_harm() {
     let mesh = bumpy(0, 1);
     let (nodes, faces) = tetgen(0);
     let text_stl = "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n";
-    let mut files: Vec<(Vec<u8>, Box<dyn Fn(&[u8]) -> Option<Loaded>>)> = vec![
+    let mut files: Vec<(Vec<u8>, Reads)> = vec![
         (written(&mesh, Format::Obj), Box::new(|b| read_obj(b).ok())),
         (written(&mesh, Format::Off), Box::new(|b| read_off(b).ok())),
         (written(&mesh, Format::Ply), Box::new(|b| ply(b).ok())),
