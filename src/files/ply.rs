@@ -126,7 +126,7 @@ pub fn check_count(element: &ElementDef, is_ascii: bool, size: u64) -> Result<()
             element.count
         ));
     }
-    if element.count as u64 > MAX_ROWS {
+    if row > 0 && element.count as u64 > MAX_ROWS {
         return Err(format!("{} of element {name}: at most {MAX_ROWS} are read", element.count));
     }
     Ok(())

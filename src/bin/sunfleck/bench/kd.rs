@@ -148,7 +148,6 @@ pub const SPHERE: &str = "sphere";
 pub fn run(args: &KdArgs) -> Result<()> {
     let common = &args.common;
     let figures = figures_kd::NAMES.map(|name| common.figure(name));
-    common.prepare("kd", &figures)?;
     let (name, source) = match &args.mesh {
         Some(path) => {
             let stem = path.file_stem().map_or("mesh".into(), |stem| stem.to_string_lossy().into_owned());
@@ -156,6 +155,7 @@ pub fn run(args: &KdArgs) -> Result<()> {
         }
         None => ("asteroid".to_owned(), None),
     };
+    common.prepare("kd", &figures)?;
     let sizes: Vec<usize> = match (args.faces.as_slice(), common.quick) {
         ([], true) => vec![1000, 4000],
         ([], false) => {
