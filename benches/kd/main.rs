@@ -40,7 +40,10 @@ fn main() {
     let mut args = std::env::args().skip(1).filter(|arg| arg != "--bench");
     while let Some(arg) = args.next() {
         let value = args.next().unwrap_or_default();
-        let wrong = || -> ! { panic!("{arg} {value}\n{HELP}") };
+        let wrong = || -> ! {
+            eprintln!("{arg} {value}\n{HELP}");
+            std::process::exit(2)
+        };
         let number = |text: &str| text.parse::<f64>().unwrap_or_else(|_| wrong());
         match arg.as_str() {
             "--faces" => options.faces = value.split(',').map(number).collect(),
