@@ -37,10 +37,20 @@ pub fn run(args: &MeshCheckArgs) -> Result<ExitCode> {
     }
     let mut fixed = loaded.mesh.clone();
     fixed.flip(&report.inward);
+    if format == Format::Stl {
+        // As the file will have it.
+        fixed.vertices.iter_mut().flatten().for_each(|x| *x = f64::from(*x as f32));
+    }
+    let written = check(&fixed, &options).with_context(|| path.display().to_string())?;
     atomic::write(path, |writer| io::write(writer, &fixed, format))?;
     eprintln!("{} faces turned round; wrote {}", file.faces(&report.inward).len(), path.display());
-    let is_clean = Report { verdict: Verdict::Outward, ..report }.is_clean();
-    Ok(if is_clean { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    if written.verdict != Verdict::Outward {
+        eprintln!(
+            "sunfleck: warning: {}: rounding to STL's single precision spoils the mesh; .obj, .ply and .off do not round",
+            path.display()
+        );
+    }
+    Ok(if written.is_clean() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// Before the work: whether and how `path` can be written.

@@ -99,6 +99,12 @@ fn a_fixed_mesh_is_clean() {
             assert_eq!(fs::read(at(name)).unwrap(), fs::read(again).unwrap());
         }
     }
+    // STL rounds: what does not survive that is told.
+    put(Path::new(&at("far.ply")), &placed(&whole, 1e-3, [1e5; 3]));
+    let output = sunfleck(&[&at("far.ply"), "--fix", "-o", &at("far.stl")]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8(output.stderr).unwrap().contains("single precision"));
+    assert!(!check(&read(Path::new(&at("far.stl"))).unwrap().mesh).is_clean());
     // What is not a matter of flipping stays, and nothing is written where it cannot be said.
     let mut flat = wrong.clone();
     flat.faces.push([0, 0, 1]);
