@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::crossings::{are_collinear, intersect};
@@ -9,7 +10,7 @@ use super::orientation::{Facing, by_rays};
 use super::overlaps::Overlaps;
 use super::report::{Doubt, Report, Shell, Verdict};
 use super::topology::Topology;
-use super::{Error, Mesh};
+use super::{Error, Mesh, corners_of_box, largest};
 use crate::index::kd::{KdOptions, KdTree, LazyKd, Sah, Triangles};
 
 /// Pairs of intersecting faces that are listed, at most.
@@ -125,7 +126,7 @@ impl Merged {
         let mut is_used = vec![false; mesh.vertices.len()];
         mesh.faces.iter().flatten().for_each(|&v| is_used[v as usize] = true);
         let used = || mesh.vertices.iter().zip(&is_used).filter(|(_, is)| **is).map(|(p, _)| *p);
-        let greatest = used().fold(0.0, |m: f64, p| m.max(super::largest(p)));
+        let greatest = used().fold(0.0, |m: f64, p| m.max(largest(p.into())));
         let scale = if greatest > 0.0 { 2.0f64.powi(-(greatest.log2() as i32).clamp(-1000, 1000)) } else { 1.0 };
         Self {
             // The others may lie anywhere.
@@ -184,13 +185,9 @@ impl Merged {
 
     /// By rays, in a frame around the origin: there rays begin where they should.
     fn facings(&self, options: &CheckOptions) -> Result<Vec<Facing>, Error> {
-        let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for p in self.faces.iter().flatten().map(|&v| self.vertices[v as usize]) {
-            min = std::array::from_fn(|axis| min[axis].min(p[axis]));
-            max = std::array::from_fn(|axis| max[axis].max(p[axis]));
-        }
-        let centre: [f64; 3] = std::array::from_fn(|axis| 0.5 * (min[axis] + max[axis]));
-        let vertices = self.vertices.iter().map(|&p| super::minus(p, centre)).collect();
+        let [min, max] = corners_of_box(self.faces.iter().flatten().map(|&v| self.vertices[v as usize]));
+        let centre = 0.5 * (min + max);
+        let vertices = self.vertices.iter().map(|&p| (DVec3::from(p) - centre).to_array()).collect();
         let triangles = Triangles::new(vertices, self.faces.clone())?;
         let parallel = options.kd.parallel;
         Ok(match options.lazy {

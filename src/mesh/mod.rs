@@ -30,6 +30,8 @@ pub use report::{Doubt, Report, Shell, Verdict};
 
 use std::path::PathBuf;
 
+use glam::DVec3;
+
 use crate::index::kd;
 
 /// Vertices, and three of them for each face, anticlockwise as seen from where its normal (b − a) × (c − a) points to.
@@ -76,19 +78,23 @@ impl Mesh {
     }
 }
 
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+/// Of length 1, whatever the unit; none if rounding leaves none.
+fn normal([a, b, c]: [[f64; 3]; 3]) -> Option<DVec3> {
+    let (ab, ac) = (DVec3::from(b) - DVec3::from(a), DVec3::from(c) - DVec3::from(a));
+    // Of lengths near 1, so that nothing vanishes when it is squared.
+    let longest = largest(ab).max(largest(ac));
+    let normal = (ab / longest).cross(ac / longest);
+    let length = normal.length();
+    (length > 0.0).then(|| normal / length)
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+/// Least and greatest corner of the box around some points.
+fn corners_of_box(points: impl Iterator<Item = [f64; 3]>) -> [DVec3; 2] {
+    let all = [DVec3::INFINITY, DVec3::NEG_INFINITY];
+    points.map(DVec3::from).fold(all, |[min, max], p| [min.min(p), max.max(p)])
 }
 
 /// Largest magnitude of a coordinate.
-fn largest(a: [f64; 3]) -> f64 {
-    a[0].abs().max(a[1].abs()).max(a[2].abs())
+fn largest(a: DVec3) -> f64 {
+    a.abs().max_element()
 }

@@ -10,9 +10,10 @@
 
 use std::ops::ControlFlow;
 
+use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{cross, dot, largest, minus};
+use super::{corners_of_box, largest, normal};
 use crate::index::kd::{Hit, Ray, RaySearch};
 use crate::math::rng::pcg4d;
 
@@ -60,35 +61,22 @@ pub fn by_rays(mesh: &impl RaySearch<f64>, parallel: bool) -> Vec<Facing> {
 
 /// The longest side of the box.
 fn size(mesh: &impl RaySearch<f64>) -> f64 {
-    let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for p in mesh.triangles().faces().iter().flatten().map(|&v| mesh.triangles().vertices()[v as usize]) {
-        min = std::array::from_fn(|axis| min[axis].min(p[axis]));
-        max = std::array::from_fn(|axis| max[axis].max(p[axis]));
-    }
-    largest(minus(max, min))
+    let used = mesh.triangles().faces().iter().flatten().map(|&v| mesh.triangles().vertices()[v as usize]);
+    let [min, max] = corners_of_box(used);
+    largest(max - min)
 }
 
 fn of_face(mesh: &impl RaySearch<f64>, size: f64, face: u32, hits: &mut Vec<Hit<f64>>) -> Facing {
-    let [a, b, c] = mesh.triangles().corners(face);
-    let (ab, ac) = (minus(b, a), minus(c, a));
-    let longest = largest(ab).max(largest(ac));
-    if longest == 0.0 {
-        return Facing::Undecided;
-    }
-    // Of lengths near 1, so that nothing vanishes when it is squared.
-    let normal = cross(ab.map(|x| x / longest), ac.map(|x| x / longest));
-    let length = dot(normal, normal).sqrt();
-    if length == 0.0 {
-        return Facing::Undecided;
-    }
-    let normal = normal.map(|x| x / length);
+    let corners = mesh.triangles().corners(face);
+    let Some(normal) = normal(corners) else { return Facing::Undecided };
+    let [a, b, c] = corners.map(DVec3::from);
     for attempt in 0..ATTEMPTS {
         let ([u, v], direction) = start(normal, face, attempt);
-        if dot(direction, normal) < MIN_COSINE {
+        if direction.dot(normal) < MIN_COSINE {
             continue;
         }
-        let origin = std::array::from_fn(|axis| a[axis] + u * ab[axis] + v * ac[axis]);
-        if let Some(n_crossings) = crossings(mesh, face, origin, direction.map(|x| x * size), size, hits) {
+        let origin = a + u * (b - a) + v * (c - a);
+        if let Some(n_crossings) = crossings(mesh, face, origin, direction * size, size, hits) {
             return if n_crossings % 2 == 0 { Facing::Outward } else { Facing::Inward };
         }
     }
@@ -96,7 +84,7 @@ fn of_face(mesh: &impl RaySearch<f64>, size: f64, face: u32, hits: &mut Vec<Hit<
 }
 
 /// Weights of the second and third corner, and a direction: first the middle along the normal, then others at random.
-fn start(normal: [f64; 3], face: u32, attempt: u32) -> ([f64; 2], [f64; 3]) {
+fn start(normal: DVec3, face: u32, attempt: u32) -> ([f64; 2], DVec3) {
     const THIRD: f64 = 1.0 / 3.0;
     if attempt == 0 {
         return ([THIRD; 2], normal);
@@ -104,21 +92,21 @@ fn start(normal: [f64; 3], face: u32, attempt: u32) -> ([f64; 2], [f64; 3]) {
     let unit = |word: u32| f64::from(word) / f64::from(u32::MAX);
     let [x, y, z, _] = pcg4d([face, attempt, 0, 0x6d657368]).map(|word| 2.0 * unit(word) - 1.0);
     let [p, q, r, _] = pcg4d([face, attempt, 1, 0x6d657368]).map(|word| 0.25 + unit(word));
-    ([p / (p + q + r), q / (p + q + r)], [normal[0] + x, normal[1] + y, normal[2] + z])
+    ([p / (p + q + r), q / (p + q + r)], normal + DVec3::new(x, y, z))
 }
 
 /// Number of faces that the ray crosses after it leaves `face`; none if rounding leaves a doubt.
 fn crossings(
     mesh: &impl RaySearch<f64>,
     face: u32,
-    origin: [f64; 3],
-    direction: [f64; 3],
+    origin: DVec3,
+    direction: DVec3,
     size: f64,
     hits: &mut Vec<Hit<f64>>,
 ) -> Option<usize> {
     // The face itself is met before or behind the origin, as that is rounded.
     let before = ROUNDINGS * f64::EPSILON * (largest(origin) / size + 1.0);
-    let ray = Ray::new(origin, direction).ok()?.within(-before, f64::INFINITY);
+    let ray = Ray::new(origin.to_array(), direction.to_array()).ok()?.within(-before, f64::INFINITY);
     hits.clear();
     let _: ControlFlow<()> = mesh.try_hits(&ray, |hit| {
         hits.push(hit);
@@ -143,14 +131,16 @@ fn crossings(
 ///
 /// Each corner, as the ray sees it, is rounded by as much as ε times its distance. That moves the edges by as much, the
 /// weights by that over the width of the triangle, and t by that of its depth.
-fn doubt(ray: &Ray<f64>, [a, b, c]: [[f64; 3]; 3], hit: &Hit<f64>) -> Option<f64> {
-    let (ab, ac, bc) = (minus(b, a), minus(c, a), minus(c, b));
+fn doubt(ray: &Ray<f64>, corners: [[f64; 3]; 3], hit: &Hit<f64>) -> Option<f64> {
+    let [a, b, c] = corners.map(DVec3::from);
+    let (origin, direction) = (DVec3::from(ray.origin()), DVec3::from(ray.direction()));
+    let (ab, ac, bc) = (b - a, c - a, c - b);
     let longest = largest(ab).max(largest(ac)).max(largest(bc));
-    let reach = [a, b, c].into_iter().fold(0.0f64, |m, p| m.max(largest(minus(p, ray.origin()))));
-    let length = largest(ray.direction());
+    let reach = [a, b, c].into_iter().fold(0.0f64, |m, p| m.max(largest(p - origin)));
+    let length = largest(direction);
     let rounding = ROUNDINGS * f64::EPSILON * reach;
     // Twice the area that the ray sees.
-    let seen = dot(ray.direction().map(|x| x / length), cross(ab, ac)).abs();
+    let seen = (direction / length).dot(ab.cross(ac)).abs();
     let nearest_edge = hit.u.min(hit.v).min(1.0 - hit.u - hit.v);
     (nearest_edge * seen > rounding * longest).then(|| rounding * (1.0 + longest * longest / seen) / length)
 }

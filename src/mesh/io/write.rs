@@ -3,7 +3,7 @@
 use std::io::{Result, Write};
 use std::path::Path;
 
-use crate::mesh::{Mesh, cross, largest, minus};
+use crate::mesh::{Mesh, normal};
 
 /// What a mesh is written as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,7 +75,8 @@ pub fn write(out: &mut impl Write, mesh: &Mesh, format: Format) -> Result<()> {
             out.write_all(&(mesh.faces.len() as u32).to_le_bytes())?;
             for face in &mesh.faces {
                 let corners = face.map(|v| mesh.vertices[v as usize]);
-                for x in normal(corners).iter().chain(corners.iter().flatten()) {
+                let normal = normal(corners).unwrap_or_default().to_array();
+                for x in normal.iter().chain(corners.iter().flatten()) {
                     out.write_all(&(*x as f32).to_le_bytes())?;
                 }
                 out.write_all(&[0; 2])?;
@@ -83,13 +84,4 @@ pub fn write(out: &mut impl Write, mesh: &Mesh, format: Format) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// Of length 1, or 0 where there is none.
-fn normal([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
-    let (ab, ac) = (minus(b, a), minus(c, a));
-    let longest = largest(ab).max(largest(ac));
-    let n = cross(ab.map(|x| x / longest), ac.map(|x| x / longest));
-    let length = n.iter().map(|x| x * x).sum::<f64>().sqrt();
-    if length > 0.0 { n.map(|x| x / length) } else { [0.0; 3] }
 }
