@@ -15,6 +15,7 @@ use super::files;
 use super::picture::PictureView;
 use super::state::{Edits, Remembered};
 use crate::cli::{Usage, ViewArgs};
+use crate::scenes::Source;
 
 /// Key of what is remembered.
 const REMEMBERED: &str = "remembered";
@@ -38,10 +39,15 @@ impl First {
             crate::job::check_output(path)?;
         }
         let mut set = args.set.clone();
-        set.extend(args.camera.iter().map(|name| format!("camera.name={name:?}")));
-        let choice = args.scene.clone().map(|name| Choice { name, set });
-        if choice.is_none() && !args.set.is_empty() {
-            bail!(Usage("--set changes a scene: which one?".into()));
+        set.extend(args.pairs()?);
+        let choice = match &args.scene {
+            Some(name) => Some(Choice { name: name.clone(), set }),
+            None if set.is_empty() => None,
+            None => bail!(Usage(format!("{}: of which scene? sunfleck view SCENE", set[0]))),
+        };
+        // What is typed wrong is said where it was typed.
+        if let Some(choice) = &choice {
+            Source::resolve(&choice.name)?.set(&choice.set)?;
         }
         let limits = Limits { iterations: args.iterations, seconds: args.seconds, noise: args.noise };
         Ok(Self { choice, limits, output: args.output.clone(), reference: args.reference.clone() })
@@ -86,8 +92,9 @@ pub struct Viewer {
 
 impl Viewer {
     pub fn new(storage: Option<&dyn eframe::Storage>, engine: Engine, wake: Wake, first: First) -> Self {
-        let remembered = storage.and_then(|storage| eframe::get_value(storage, REMEMBERED)).unwrap_or_default();
-        let wanted = Wanted { scene: first.choice.map(Arc::new), limits: first.limits, ..Wanted::default() };
+        let remembered: Remembered = storage.and_then(|s| eframe::get_value(s, REMEMBERED)).unwrap_or_default();
+        let mut wanted = Wanted { scene: first.choice.map(Arc::new), limits: first.limits, ..Wanted::default() };
+        wanted.painting.look.tonemap = remembered.tone();
         let now = engine.now();
         Self {
             engine,
@@ -265,6 +272,7 @@ impl Viewer {
         if let Some(path) = self.reference.take() {
             super::compare::load(ui, self, &path);
         }
+        self.look_at_reference(ui);
         super::keys::handle(ui, self);
         egui::Panel::top("bar").show(ui, |ui| super::bar::show(ui, self));
         egui::Panel::bottom("status").show(ui, |ui| super::bar::status(ui, self));
@@ -398,6 +406,7 @@ impl eframe::App for Viewer {
     }
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
+        self.remembered.tone = self.wanted.painting.look.tonemap.name().to_owned();
         eframe::set_value(storage, REMEMBERED, &self.remembered);
     }
 }

@@ -36,6 +36,14 @@ use app::Viewer;
 /// Where eframe keeps what is remembered, and what the window manager knows the window by.
 const APP_ID: &str = "sunfleck";
 
+/// What the windowing library says, without the line of its source that it says first.
+fn no_window(error: &eframe::Error) -> anyhow::Error {
+    let text = error.to_string();
+    let words =
+        text.rsplit_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")).map_or(text.as_str(), |(_, words)| words);
+    anyhow!("no window: {}", words.trim_end_matches('.'))
+}
+
 pub fn run(args: &ViewArgs) -> Result<ExitCode> {
     devices::use_threads(args.device.threads)?;
     let device = devices::open(&args.device, &Progress::new(false))?;
@@ -60,6 +68,6 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode> {
             Ok(Box::new(Viewer::new(creation.storage, engine, wake, first)))
         }),
     )
-    .map_err(|error| anyhow!("no window: {error}"))?;
+    .map_err(|error| no_window(&error))?;
     Ok(ExitCode::SUCCESS)
 }
