@@ -26,6 +26,8 @@ mod report;
 mod search;
 mod sorted;
 mod thesis;
+#[cfg(feature = "view")]
+mod view;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -49,6 +51,8 @@ Examples:
       The paper's Table 1 on this machine; its 50 iterations take hours without a GPU.
   sunfleck bench kd --mesh eros.obj -o results
       Builders of kd-trees in the mesh check, over a mesh split and simplified from 1,000 to 140,296 faces.
+  sunfleck bench view --backend gpu -o results
+      Whether the window stays smooth; needs a display.
 
 Into the folder go NAME.json, NAME.csv and an .svg for each figure; the tables are printed too.";
 
@@ -72,6 +76,9 @@ enum Benchmark {
     Indices(indices::IndicesArgs),
     /// kd-trees over triangles in the mesh check (Figures 7.2 to 7.8 of the thesis on them)
     Kd(kd::KdArgs),
+    /// Frames of the window while the heaviest shipped scene renders behind it
+    #[cfg(feature = "view")]
+    View(view::ViewBenchArgs),
 }
 
 /// Of the benchmarks that search on several devices.
@@ -120,6 +127,8 @@ pub fn run(args: &BenchArgs) -> Result<ExitCode> {
         Benchmark::Photons(args) => photons::run(args)?,
         Benchmark::Indices(args) => indices::run(args)?,
         Benchmark::Kd(args) => kd::run(args)?,
+        #[cfg(feature = "view")]
+        Benchmark::View(args) => view::run(args)?,
     }
     Ok(ExitCode::SUCCESS)
 }

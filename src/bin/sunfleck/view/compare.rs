@@ -33,6 +33,13 @@ impl Default for CompareView {
     }
 }
 
+impl CompareView {
+    /// The texture is of a window that is gone.
+    pub fn forget(&mut self) {
+        self.texture = None;
+    }
+}
+
 /// What a texture of the reference was made from.
 struct Made {
     reference: Arc<Reference>,

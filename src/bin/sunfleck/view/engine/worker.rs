@@ -290,7 +290,7 @@ fn of_scene(settings: &Settings) -> Settings {
     }
 }
 
-fn write(save: &Save, frame: &Frame, adapter: String) -> Result<u32> {
+pub fn write(save: &Save, frame: &Frame, adapter: String) -> Result<u32> {
     let (film, params) = (&frame.film, &frame.params);
     let picture = frame.picture();
     if is_png(&save.path) {

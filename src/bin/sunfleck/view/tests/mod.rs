@@ -3,6 +3,7 @@
 mod panels;
 mod shortcuts;
 mod snapshots;
+mod window;
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
@@ -65,7 +66,7 @@ impl Window {
             output: None,
             reference: None,
         };
-        let mut viewer = Viewer::new(None, engine(), Arc::new(|| {}), first);
+        let mut viewer = Viewer::new(engine(), Arc::new(|| {}), first);
         let asked = Arc::new(Mutex::new(vec![]));
         let (noted, place) = (Arc::clone(&asked), folder.path().to_owned());
         viewer.pick = Arc::new(move |purpose, _| {
@@ -79,7 +80,7 @@ impl Window {
             .allow_missing_glyphs()
             .with_accessibility_check(false)
             .renderer(renderer)
-            .build_ui_state(|ui, viewer: &mut Viewer| viewer.show(ui), viewer);
+            .build_ui_state(|ui, viewer: &mut Viewer| viewer.show(ui, None), viewer);
         Self { harness, commands: vec![], copied: vec![], asked, folder }
     }
 

@@ -280,8 +280,9 @@ fn the_tone_curve_comes_back() {
     let mut window = Window::new(None);
     window.viewer().wanted.painting.look.tonemap = ToneMap::Agx;
     let mut kept = Kept::default();
-    eframe::App::save(window.viewer(), &mut kept);
-    let viewer = Viewer::new(Some(&kept), super::engine(), Arc::new(|| {}), First::default());
+    window.viewer().save(&mut kept);
+    let mut viewer = Viewer::new(super::engine(), Arc::new(|| {}), First::default());
+    viewer.enter(Some(&kept));
     assert_eq!(viewer.wanted.painting.look.tonemap, ToneMap::Agx);
 }
 
