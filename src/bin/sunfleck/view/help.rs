@@ -23,16 +23,29 @@ const HAND: &[(&str, &str)] = &[
 /// Room that two columns need, points.
 const TWO_COLUMNS: f32 = 900.0;
 
+/// Of the window, points: two columns of everything.
+const USUAL: egui::Vec2 = egui::vec2(960.0, 580.0);
+
+/// As it is printed on the key.
+fn name(ui: &egui::Ui, keys: &egui::KeyboardShortcut) -> String {
+    match keys.logical_key {
+        egui::Key::Questionmark => "?".to_owned(),
+        egui::Key::Plus => "+".to_owned(),
+        egui::Key::Minus => "−".to_owned(),
+        _ => ui.ctx().format_shortcut(keys),
+    }
+}
+
 /// The window with the help, if it is asked for.
 pub fn show(ui: &egui::Ui, viewer: &mut Viewer) {
     let mut open = viewer.show_help;
     // All of it in sight where the window has room for two columns.
     let room = ui.ctx().content_rect().shrink(48.0);
     let window = egui::Window::new("Keys and mouse").open(&mut open).collapsible(false).scroll(true);
-    let window = window.default_size(room.size()).max_size(room.size()).default_pos(room.left_top());
+    let window = window.default_size(room.size().min(USUAL)).max_size(room.size()).default_pos(room.left_top());
     window.show(ui.ctx(), |ui| {
         let hand = HAND.iter().map(|(hand, what)| ((*hand).to_owned(), *what));
-        let keys = SHORTCUTS.iter().map(|shortcut| (ui.ctx().format_shortcut(&shortcut.keys), shortcut.what));
+        let keys = SHORTCUTS.iter().map(|shortcut| (name(ui, &shortcut.keys), shortcut.what));
         let lines: Vec<_> = hand.chain(keys).collect();
         let n_columns = if room.width() >= TWO_COLUMNS { 2 } else { 1 };
         ui.horizontal_top(|ui| {

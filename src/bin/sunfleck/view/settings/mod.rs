@@ -41,6 +41,9 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer) {
         });
     });
     ui.separator();
+    // Beside the ways back, not over them.
+    let scroll = &mut ui.spacing_mut().scroll;
+    scroll.floating_allocated_width = scroll.bar_width;
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         for (title, hint, is_open, group) in GROUPS {
             let header = egui::CollapsingHeader::new(egui::RichText::new(title).strong()).default_open(is_open);
