@@ -47,7 +47,6 @@ Examples:
       Radius search on uniform and clustered points, in less than a minute.
   sunfleck bench search --threads 1 --rounds 9 -o results
       All of it, which takes its time.
-
   sunfleck bench photons --iterations 5 -o results
       The paper's Table 1 on this machine; its 50 iterations take hours without a GPU.
   sunfleck bench kd --mesh eros.obj -o results
@@ -58,7 +57,7 @@ Examples:
 Into the folder go NAME.json, NAME.csv and an .svg for each figure; the tables are printed too.";
 
 #[derive(Debug, Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, arg_required_else_help = false)]
 pub struct BenchArgs {
     /// What to measure
     #[command(subcommand)]
@@ -102,11 +101,11 @@ struct Common {
     quick: bool,
 
     /// CPU threads [default: all]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
 
-    /// Of the random points, and of the asteroid
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    /// Of the random numbers
+    #[arg(long, value_name = "N", allow_hyphen_values = true, default_value_t = 0)]
     seed: u32,
 
     /// Say nothing but errors while measuring
@@ -117,7 +116,7 @@ struct Common {
 #[derive(Debug, Args)]
 struct Rounds {
     /// Rounds that count, after one that does not
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     rounds: u32,
 }
 
@@ -197,9 +196,15 @@ fn length(text: &str) -> Result<f32, String> {
     }
 }
 
+/// Points, queries or faces, at most: every index over as many, side by side, still fits into a large machine.
+const MOST: u32 = 20_000_000;
+
 /// How many points.
 fn count(text: &str) -> Result<usize, String> {
-    parse_count(text).map(|n| n as usize)
+    match parse_count(text)? {
+        n if n <= MOST => Ok(n as usize),
+        _ => Err("at most 20M".into()),
+    }
 }
 
 /// "100K", "2M".

@@ -15,6 +15,7 @@ use super::files;
 use super::picture::PictureView;
 use super::state::{Edits, Remembered};
 use crate::cli::{Usage, ViewArgs};
+use crate::scenes::Source;
 
 /// Key of what is remembered.
 const REMEMBERED: &str = "remembered";
@@ -38,10 +39,15 @@ impl First {
             crate::job::check_output(path)?;
         }
         let mut set = args.set.clone();
-        set.extend(args.camera.iter().map(|name| format!("camera.name={name:?}")));
-        let choice = args.scene.clone().map(|name| Choice { name, set });
-        if choice.is_none() && !args.set.is_empty() {
-            bail!(Usage("--set changes a scene: which one?".into()));
+        set.extend(args.pairs()?);
+        let choice = match &args.scene {
+            Some(name) => Some(Choice { name: name.clone(), set }),
+            None if set.is_empty() => None,
+            None => bail!(Usage(format!("{}: of which scene? sunfleck view SCENE", set[0]))),
+        };
+        // What is typed wrong is said where it was typed.
+        if let Some(choice) = &choice {
+            Source::resolve(&choice.name)?.set(&choice.set)?;
         }
         let limits = Limits { iterations: args.iterations, seconds: args.seconds, noise: args.noise };
         Ok(Self { choice, limits, output: args.output.clone(), reference: args.reference.clone() })
@@ -123,6 +129,7 @@ impl Viewer {
     pub fn enter(&mut self, storage: Option<&dyn eframe::Storage>) {
         if !std::mem::replace(&mut self.entered, true) {
             self.remembered = storage.and_then(|storage| eframe::get_value(storage, REMEMBERED)).unwrap_or_default();
+            self.wanted.painting.look.tonemap = self.remembered.tone();
             return;
         }
         self.picture.forget();
@@ -133,7 +140,8 @@ impl Viewer {
 
     /// Keeps what is to be remembered.
     pub fn save(&self, storage: &mut dyn eframe::Storage) {
-        eframe::set_value(storage, REMEMBERED, &self.remembered);
+        let tone = self.wanted.painting.look.tonemap.name().to_owned();
+        eframe::set_value(storage, REMEMBERED, &Remembered { tone, ..self.remembered.clone() });
     }
 
     /// Opens a file, or a shipped scene by its name.
@@ -306,6 +314,7 @@ impl Viewer {
         if let Some(path) = self.reference.take() {
             super::compare::load(ui, self, &path);
         }
+        self.look_at_reference(ui);
         super::keys::handle(ui, self);
         egui::Panel::top("bar").show(ui, |ui| super::bar::show(ui, self));
         egui::Panel::bottom("status").show(ui, |ui| super::bar::status(ui, self));

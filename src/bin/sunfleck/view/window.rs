@@ -111,7 +111,7 @@ pub fn run(
                 continue;
             }
             (_, Some(fault)) => anyhow!("the window's graphics device failed: {fault}"),
-            (Ok(Err(error)), None) => anyhow!("no window: {error}"),
+            (Ok(Err(error)), None) => anyhow!("no window: {}", without_source(&error.to_string())),
             (Err(panic), None) => anyhow!("the window is gone: {panic}"),
         };
         return Err(match rescue(viewer) {
@@ -119,6 +119,12 @@ pub fn run(
             None => why,
         });
     }
+}
+
+/// What winit says, without the line of its source that it says first.
+fn without_source(text: &str) -> &str {
+    let words = text.rsplit_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")).map_or(text, |(_, words)| words);
+    words.trim_end_matches('.')
 }
 
 /// A panic of the window's libraries is an error, told in one line: winit panics when the display goes away, egui-wgpu when

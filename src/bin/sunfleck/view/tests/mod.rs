@@ -48,6 +48,10 @@ struct Window {
     folder: TempDir,
 }
 
+fn engine() -> Engine {
+    Engine::start(Device::Cpu(sunfleck::scene::Accelerator::Bvh), Arc::new(|| {})).unwrap()
+}
+
 impl Window {
     fn new(scene: Option<&str>) -> Self {
         Self::with_renderer(scene, NoPixels)
@@ -62,8 +66,7 @@ impl Window {
             output: None,
             reference: None,
         };
-        let engine = Engine::start(Device::Cpu(sunfleck::scene::Accelerator::Bvh), Arc::new(|| {})).unwrap();
-        let mut viewer = Viewer::new(engine, Arc::new(|| {}), first);
+        let mut viewer = Viewer::new(engine(), Arc::new(|| {}), first);
         let asked = Arc::new(Mutex::new(vec![]));
         let (noted, place) = (Arc::clone(&asked), folder.path().to_owned());
         viewer.pick = Arc::new(move |purpose, _| {
