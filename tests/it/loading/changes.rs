@@ -153,7 +153,7 @@ fn overrides_by_name() {
     let before = settings.clone();
     for (assignment, part) in [
         ("material.floor.roughness=2", "material[0].roughness"),
-        ("material.9.roughness=0.5", "there are 4"),
+        ("material.9.roughness=0.5", "the settings have 4"),
         ("material.4.roughness=0.5", "name or an index"),
         ("sphere.ball.radius=1", "ball"),
         ("sphere.0.radius=", "radius"),

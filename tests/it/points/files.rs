@@ -305,7 +305,7 @@ fn files_that_cannot_be_read() {
         ("a.stl", "none of .ply, .obj, .xyz"),
         ("b.xyz", "line 1: 2 columns"),
         ("c.ply", "is not a regular file"),
-        ("d.ply", "not found"),
+        ("d.ply", "No such file"),
     ] {
         let error = read(&at(name)).unwrap_err();
         assert!(matches!(error, Error::File { .. }));

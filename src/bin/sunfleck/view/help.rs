@@ -49,6 +49,7 @@ pub fn show(ui: &egui::Ui, viewer: &mut Viewer) {
         let lines: Vec<_> = hand.chain(keys).collect();
         let n_columns = if room.width() >= TWO_COLUMNS { 2 } else { 1 };
         ui.horizontal_top(|ui| {
+            ui.spacing_mut().item_spacing.x = 20.0;
             for (i, part) in lines.chunks(lines.len().div_ceil(n_columns)).enumerate() {
                 egui::Grid::new(("keys", i)).num_columns(2).striped(true).show(ui, |ui| {
                     for (keys, what) in part {
