@@ -237,6 +237,7 @@ mod tests {
         assert_eq!(apart([[2.0, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, 1.0, 0.0]]), TOUCH, "at a corner");
         assert_eq!(apart([[0.5, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, -1.0, 0.0]]), TOUCH, "along an edge");
         assert_eq!(apart([[2.1, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, 1.0, 0.0]]), None, "apart, on the line of an edge");
+        assert_eq!(apart([[2.1, 0.0, 0.0], [2.2, 0.0, 0.0], [-30.0, -1.0, 0.0]]), None, "the same, but hard to part");
         assert_eq!(apart([[1.1, 1.1, 0.0], [3.0, 1.0, 0.0], [3.0, 3.0, 0.0]]), None, "beside");
     }
 

@@ -221,7 +221,7 @@ mod tests {
                     .map(|&b| ([a, b], ())),
             );
         }
-        assert!(expected.len() > 1000, "{}", expected.len());
+        assert!(expected.len() > 500, "{}", expected.len());
         for parallel in [false, true] {
             let overlaps = Overlaps::new(&boxes, some.clone(), parallel);
             let pairs = |found, asked| overlaps.pairs(|_, _| Some(()), Limits { found, asked });

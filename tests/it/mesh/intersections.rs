@@ -179,6 +179,11 @@ fn fans_and_copies_are_no_intersections() {
     let report = check(&pierced);
     assert_eq!(report.duplicates, [[5, 4], [6, 0]]);
     assert_eq!(report.intersections, [[0, 4], [0, 5], [2, 4], [2, 5], [4, 6], [5, 6]]);
+    // Rays go through two copies as if there were none.
+    let mut roofed = tetrahedron();
+    roofed.vertices.extend([[-9.0, -9.0, 2.0], [9.0, -9.0, 2.0], [0.0, 20.0, 2.0]]);
+    roofed.faces.extend([[4, 5, 6], [4, 6, 5]]);
+    assert_eq!(check(&roofed).verdict, Verdict::Unknown(Doubt::Undecided));
     let mut copies = tetrahedron();
     copies.faces = vec![[0, 1, 2]; 100_000];
     let report = check(&copies);
