@@ -84,7 +84,8 @@ fn refused(error: String) -> PyErr {
 }
 
 /// Origins and directions, `[n, 3]`, and first and last t, `[n]`.
-type Arrays<'py, T> = (PyReadonlyArray2<'py, T>, PyReadonlyArray2<'py, T>, PyReadonlyArray1<'py, T>, PyReadonlyArray1<'py, T>);
+type Arrays<'py, T> =
+    (PyReadonlyArray2<'py, T>, PyReadonlyArray2<'py, T>, PyReadonlyArray1<'py, T>, PyReadonlyArray1<'py, T>);
 
 fn rays<'a, T: Element>((origins, directions, min, max): &'a Arrays<'_, T>) -> PyResult<Rays<'a, T>> {
     let ranges = [min.as_slice()?, max.as_slice()?];
@@ -128,22 +129,14 @@ macro_rules! class {
             }
 
             /// Whether there is a hit.
-            fn any<'py>(
-                &self,
-                py: Python<'py>,
-                of: Arrays<'py, $scalar>,
-            ) -> PyResult<Array<'py, bool>> {
+            fn any<'py>(&self, py: Python<'py>, of: Arrays<'py, $scalar>) -> PyResult<Array<'py, bool>> {
                 let rays = rays(&of)?;
                 let found = py.detach(|| rays.ask(|ray| self.0.any(ray))).map_err(refused)?;
                 Ok(found.into_pyarray(py))
             }
 
             /// Number of hits.
-            fn count<'py>(
-                &self,
-                py: Python<'py>,
-                of: Arrays<'py, $scalar>,
-            ) -> PyResult<Array<'py, u32>> {
+            fn count<'py>(&self, py: Python<'py>, of: Arrays<'py, $scalar>) -> PyResult<Array<'py, u32>> {
                 let rays = rays(&of)?;
                 let found = py.detach(|| rays.ask(|ray| self.0.count(ray) as u32)).map_err(refused)?;
                 Ok(found.into_pyarray(py))

@@ -69,7 +69,8 @@ fn are_parted(a: Triangle, b: Triangle, shared: usize) -> bool {
     let normal = match shared {
         0 => a[0] + a[1] + a[2] - (b[0] + b[1] + b[2]),
         _ => {
-            let towards = |p: DVec3| p / largest(p);
+            // Scaled first: the square of a length may vanish.
+            let towards = |p: DVec3| (p / largest(p)).normalize();
             towards(a[1]) + towards(a[2]) - towards(b[1]) - towards(b[2])
         }
     };

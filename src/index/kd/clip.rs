@@ -179,6 +179,17 @@ mod tests {
     }
 
     #[test]
+    fn boxes_are_rounded_outward() {
+        for seed in 0..1000 {
+            let [a, b, sign, _] = pcg4d([seed, 0, 3, 2]);
+            let x = (f64::from(a) + f64::from(b) / 4e9) / 4e9 * if sign % 2 == 0 { 1.0 } else { -1.0 };
+            let (below, above) = (f64::from(down(x)), f64::from(up(x)));
+            assert!(below <= x && x <= above && above - below < 1e-6, "{x}");
+        }
+        assert_eq!((down(0.5), up(0.5)), (0.5, 0.5));
+    }
+
+    #[test]
     fn the_box_is_that_of_the_part() {
         let cell = Aabb { min: [0.0; 3], max: [1.0; 3] };
         // A corner of the triangle is cut off at x = 0, half way.

@@ -279,6 +279,25 @@ fn any_number_of_threads_builds_the_same_tree() {
     }
 }
 
+/// A cell knows only its part of a triangle: where a diagonal one leaves it, space is cut off.
+#[test]
+fn a_triangle_that_is_cut_is_clipped() {
+    let p =
+        vec![[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [1.0, 1.0, 0.01], [0.5, 0.1, 0.0], [0.5, 0.2, 0.0], [0.5, 0.1, 0.01]];
+    let sah = Sah { traversal: 0.01, ..Sah::default() };
+    for builder in REAL {
+        let options = KdOptions { builder, sah, ..KdOptions::default() };
+        let tree =
+            KdTree::new(Triangles::<f64>::new(p.clone(), vec![[0, 1, 2], [3, 4, 5]]).unwrap(), &options).unwrap();
+        let is_new = |node: NodeView| match node {
+            NodeView::Inner { axis, at } => p.iter().all(|q| (q[axis] - at).abs() > 1e-6),
+            NodeView::Leaf(_) => false,
+        };
+        // At no corner's coordinate: where the diagonal leaves a cell.
+        assert!(tree.nodes().any(is_new), "{builder:?}");
+    }
+}
+
 #[test]
 fn what_is_wrong_is_an_error() {
     let p = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0f32]];
