@@ -395,7 +395,16 @@ impl Context {
 
     /// Waits until the device has done all it was given.
     pub(super) fn wait(&self) -> Result<(), Error> {
-        let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
+        self.poll(wgpu::PollType::wait_indefinitely())
+    }
+
+    /// Waits until the device has done this, and all before it.
+    pub(super) fn wait_for(&self, submission: wgpu::SubmissionIndex) -> Result<(), Error> {
+        self.poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout: None })
+    }
+
+    fn poll(&self, how: wgpu::PollType) -> Result<(), Error> {
+        let polled = self.device.poll(how);
         self.check()?;
         polled.map_err(|error| self.error(error.to_string()))?;
         Ok(())
