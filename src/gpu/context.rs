@@ -395,19 +395,19 @@ impl Context {
 
     /// Waits until the device has done all it was given.
     pub(super) fn wait(&self) -> Result<(), Error> {
-        self.poll(wgpu::PollType::wait_indefinitely())
+        let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
+        self.check()?;
+        polled.map_err(|error| self.error(error.to_string()))?;
+        Ok(())
     }
 
     /// Waits until the device has done this, and all before it.
     pub(super) fn wait_for(&self, submission: wgpu::SubmissionIndex) -> Result<(), Error> {
-        self.poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout: None })
-    }
-
-    fn poll(&self, how: wgpu::PollType) -> Result<(), Error> {
-        let polled = self.device.poll(how);
-        self.check()?;
-        polled.map_err(|error| self.error(error.to_string()))?;
-        Ok(())
+        match self.device.poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout: None }) {
+            Ok(_) => self.check(),
+            // A lost device never took it; wgpu says that it is lost only where all is waited for.
+            Err(_) => self.wait(),
+        }
     }
 
     /// A buffer of at least one byte; `bound` says how much of it one shader sees at once.
