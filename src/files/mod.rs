@@ -21,10 +21,12 @@ pub fn open(path: &Path) -> Result<(BufReader<File>, u64), String> {
     Ok((BufReader::with_capacity(1 << 16, File::open(path).map_err(|e| plain(&e))?), metadata.len()))
 }
 
-/// What the system says, in words.
+/// What went wrong in words: the system's, if it was the system, without the number that says the same.
 pub fn plain(error: &std::io::Error) -> String {
+    let text = error.to_string();
     match error.kind() {
-        ErrorKind::Other | ErrorKind::InvalidInput | ErrorKind::InvalidData => error.to_string(),
+        _ if error.raw_os_error().is_some() => text.split(" (os error ").next().unwrap_or(&text).to_owned(),
+        ErrorKind::Other | ErrorKind::InvalidInput | ErrorKind::InvalidData => text,
         kind => kind.to_string(),
     }
 }

@@ -59,6 +59,9 @@ fn temporary(target: &Path) -> io::Result<NamedTempFile> {
         Err(e) if e.kind() == io::ErrorKind::NotFound => None,
         Err(e) => return Err(e),
     };
+    if target.as_os_str().to_string_lossy().ends_with(std::path::is_separator) {
+        return Err(io::Error::from(io::ErrorKind::IsADirectory));
+    }
     let folder = folder(target);
     if !folder.is_dir() {
         return Err(io::Error::new(io::ErrorKind::NotFound, format!("there is no folder {}", folder.display())));

@@ -17,7 +17,7 @@
 
 use std::collections::HashMap;
 use std::fs::File;
-use std::io::{self, BufReader};
+use std::io::{self, BufReader, Read};
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -60,6 +60,8 @@ pub struct Header {
 
 /// Largest picture that [`read`] takes, pixels: 3 GiB of linear RGB.
 pub const MAX_READ_PIXELS: u64 = 1 << 28;
+/// Every OpenEXR file begins with these.
+const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
 /// Writes `picture`, losslessly compressed.
 pub fn write(path: &Path, picture: &Picture, header: &Header) -> Result<(), Error> {
@@ -167,6 +169,10 @@ pub fn read(path: &Path) -> Result<Picture, Error> {
     let kind = std::fs::metadata(path).map_err(|e| fail(&e))?;
     if !kind.is_file() {
         return Err(fail(&"not a regular file"));
+    }
+    let mut begin = [0; 4];
+    if File::open(path).and_then(|mut file| file.read_exact(&mut begin)).is_ok() && begin != MAGIC {
+        return Err(fail(&"not an OpenEXR file"));
     }
     let meta = ::exr::meta::MetaData::read_from_file(path, false).map_err(|e| fail(&e))?;
     let pixels = |h: &::exr::meta::header::Header| h.layer_size.0 as u64 * h.layer_size.1 as u64;

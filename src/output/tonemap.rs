@@ -17,6 +17,23 @@ pub enum ToneMap {
 }
 
 impl ToneMap {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Neutral, Self::Agx, Self::Srgb];
+
+    /// As the command line has it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Neutral => "neutral",
+            Self::Agx => "agx",
+            Self::Srgb => "srgb",
+        }
+    }
+
+    /// The inverse of [`ToneMap::name`].
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|tonemap| tonemap.name() == name)
+    }
+
     /// Exposed radiance to display-linear RGB in [0, 1]. NaN and negative values count as 0.
     pub fn apply(self, rgb: [f32; 3]) -> [f32; 3] {
         let rgb = rgb.map(|c| if c > 0.0 { c.min(1e9) } else { 0.0 });

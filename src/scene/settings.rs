@@ -34,10 +34,17 @@ mod values;
 
 pub use changes::{MaterialSettings, SceneLightSettings};
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 pub use values::{Count, Direct, FirstRadius, Kernel, LightKind, Size, parse_count};
 
+use super::Environment;
 use super::load::LoadError;
+
+/// Width and height of a picture, pixels, at most.
+pub const MAX_SIDE: u32 = 65_535;
+
+/// Reads the environment of a file, with warnings, as [`load_environment`](super::load::load_environment) does.
+pub type ReadEnvironment<'a> = dyn FnMut(&Path) -> Result<(Environment, Vec<String>), LoadError> + 'a;
 
 /// What a settings file says. A field left out has the default named, or keeps what the scene file says.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -102,7 +109,7 @@ pub struct Settings {
     pub lights: Vec<LightSettings>,
 }
 
-/// The camera: the one named, else the scene's first, else one that frames the scene; then changed as said.
+/// The camera: the one named (or of that number, from 0), else the scene's first, else one that frames the scene; then changed as said.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CameraSettings {

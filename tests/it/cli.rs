@@ -175,7 +175,9 @@ fn wrong_usage() {
 fn outputs_are_checked_before_the_scene_is_read() {
     let folder = folder_with_floor();
     fs::create_dir(folder.path().join("dir.png")).unwrap();
-    for (output, part) in [("no/a.png", "there is no folder no"), ("dir.png", "is a directory")] {
+    for (output, part) in
+        [("no/a.png", "there is no folder no"), ("dir.png", "is a directory"), ("none.png/", "is a directory")]
+    {
         assert_error(&sunfleck(folder.path(), ["render", "absent.glb", "-o", output]), 1, &[output, part]);
     }
 }

@@ -2,13 +2,14 @@
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
-use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use exr::meta::MetaData;
 use exr::meta::attribute::{AttributeValue, Text};
 use sunfleck::output;
+use tempfile::TempDir;
 use x11rb::connection::Connection;
 use x11rb::protocol::xproto::{
     AtomEnum, BUTTON_PRESS_EVENT, BUTTON_RELEASE_EVENT, ConnectionExt, InputFocus, KEY_PRESS_EVENT, KEY_RELEASE_EVENT,
@@ -37,7 +38,7 @@ impl Drop for Process {
 
 /// An X server without a screen, and what types and points there.
 struct Display {
-    _server: Process,
+    server: Process,
     name: String,
     connection: RustConnection,
     root: Window,
@@ -63,7 +64,7 @@ impl Display {
         let map = connection.get_keyboard_mapping(first, last - first + 1).unwrap().reply().unwrap();
         let columns = usize::from(map.keysyms_per_keycode);
         let keys = (first..=last).zip(map.keysyms.chunks(columns).map(<[u32]>::to_vec)).collect();
-        Some(Self { _server: server, name, connection, root, keys })
+        Some(Self { server, name, connection, root, keys })
     }
 
     fn fake(&self, event: u8, detail: u8, at: [i16; 2]) {
@@ -120,46 +121,93 @@ fn text(path: &Path, name: &str) -> Option<String> {
     }
 }
 
+/// The program in a folder of its own, on a display of its own.
+struct Opened {
+    display: Display,
+    viewer: Process,
+    folder: TempDir,
+    log: PathBuf,
+}
+
+/// After so many iterations it pauses.
+const ITERATIONS: &str = "5";
+
+impl Opened {
+    /// Cornell's box, small; `Ctrl+S` saves to `saved.exr`. `None` where there can be no window, unless there has to be one.
+    fn new(backend: &str) -> Option<Self> {
+        let is_required = std::env::var_os("SUNFLECK_REQUIRE_GPU").is_some();
+        let skip = |why: &str| {
+            assert!(!is_required, "SUNFLECK_REQUIRE_GPU is set, but: {why}");
+            println!("skipped: {why}");
+            None
+        };
+        let devices = Command::new(PROGRAM).arg("--list-devices").output().unwrap().stdout;
+        if devices.iter().filter(|c| **c == b'\n').count() < 2 {
+            return skip("no GPU adapter");
+        }
+        let Some(display) = Display::start() else { return skip("no Xvfb") };
+        let folder = tempfile::tempdir().unwrap();
+        let log = folder.path().join("stderr.txt");
+        let mut command = Command::new(PROGRAM);
+        command.args(["view", "cornell", "--backend", backend, "--iterations", ITERATIONS, "-o", "saved.exr"]);
+        command.args(["--set", "size=64x48", "--set", "photons=4k"]);
+        command.env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY").env_remove("RUST_BACKTRACE");
+        for home in ["XDG_DATA_HOME", "XDG_CONFIG_HOME", "XDG_STATE_HOME"] {
+            command.env(home, folder.path());
+        }
+        command.current_dir(folder.path()).stderr(File::create(&log).unwrap());
+        let viewer = Process(command.spawn().unwrap());
+        Some(Self { display, viewer, folder, log })
+    }
+
+    /// Waits for the end of the program: how it ended, and what it said.
+    fn ended(&mut self) -> (ExitStatus, String) {
+        let began = Instant::now();
+        loop {
+            if let Some(status) = self.viewer.0.try_wait().unwrap() {
+                return (status, fs::read_to_string(&self.log).unwrap());
+            }
+            assert!(began.elapsed() < PATIENCE, "it does not quit");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+}
+
+/// Without its display the program cannot go on; what it has rendered is saved.
+#[test]
+fn a_picture_outlives_its_display() {
+    let Some(mut opened) = Opened::new("cpu") else { return };
+    let title = format!("cornell – {ITERATIONS} iterations – Sunfleck");
+    let Opened { display, viewer, .. } = &mut opened;
+    wait_for("iterations", viewer, || display.window().filter(|(_, now)| *now == title));
+    display.server.0.kill().unwrap();
+    let (status, log) = opened.ended();
+    assert_eq!(status.code(), Some(1), "{log}");
+    assert!(log.starts_with("sunfleck: error: saved the picture as saved.exr: ") && log.lines().count() == 1, "{log}");
+    assert_eq!(output::exr::read(&opened.folder.path().join("saved.exr")).unwrap().size, [64, 48]);
+}
+
 /// Opens a scene, orbits, changes a setting, saves, quits; what was saved is what its command renders.
 #[test]
 fn a_picture_saved_in_the_window_is_what_its_command_renders() {
-    const ITERATIONS: &str = "5";
-    let is_required = std::env::var_os("SUNFLECK_REQUIRE_GPU").is_some();
-    let skip = |why: &str| {
-        assert!(!is_required, "SUNFLECK_REQUIRE_GPU is set, but: {why}");
-        println!("skipped: {why}");
-    };
-    let devices = Command::new(PROGRAM).arg("--list-devices").output().unwrap().stdout;
-    if devices.iter().filter(|c| **c == b'\n').count() < 2 {
-        return skip("no GPU adapter");
-    }
-    let Some(display) = Display::start() else { return skip("no Xvfb") };
-    let folder = tempfile::tempdir().unwrap();
-    let [saved, kept, log] = ["saved.exr", "kept.exr", "stderr.txt"].map(|name| folder.path().join(name));
-
-    let mut command = Command::new(PROGRAM);
-    command.args(["view", "cornell", "--backend", "gpu", "--iterations", ITERATIONS, "-o"]).arg(&saved);
-    command.args(["--set", "size=64x48", "--set", "photons=4k"]);
-    command.env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY").current_dir(folder.path());
-    for home in ["XDG_DATA_HOME", "XDG_CONFIG_HOME", "XDG_STATE_HOME"] {
-        command.env(home, folder.path());
-    }
-    let mut viewer = Process(command.stderr(File::create(&log).unwrap()).spawn().unwrap());
+    let Some(mut opened) = Opened::new("gpu") else { return };
+    let Opened { display, viewer, folder, .. } = &mut opened;
+    let [saved, kept] = ["saved.exr", "kept.exr"].map(|name| folder.path().join(name));
 
     let title = format!("cornell – {ITERATIONS} iterations – Sunfleck");
     let iterated = || display.window().filter(|(_, now)| *now == title);
-    let (window, _) = wait_for("iterations", &mut viewer, iterated);
+    let (window, _) = wait_for("iterations", viewer, iterated);
     let focused = |window| {
         let _ = display.connection.set_input_focus(InputFocus::PARENT, window, x11rb::CURRENT_TIME).unwrap().check();
         let focus = display.connection.get_input_focus().unwrap().reply().unwrap().focus;
         (focus == window).then_some(())
     };
-    wait_for("focus", &mut viewer, || focused(window));
+    wait_for("focus", viewer, || focused(window));
     // Orbits, back and forth until the picture is another one.
     display.point(640, 360);
     display.fake(BUTTON_PRESS_EVENT, LEFT, [0, 0]);
     let mut steps = 0;
-    wait_for("orbit", &mut viewer, || {
+    wait_for("orbit", viewer, || {
         steps += 1;
         display.point(640 + steps % 100, 360);
         display.window().filter(|(_, now)| *now != title).map(|_| ())
@@ -167,7 +215,7 @@ fn a_picture_saved_in_the_window_is_what_its_command_renders() {
     display.fake(BUTTON_RELEASE_EVENT, LEFT, [0, 0]);
     display.press(&[u32::from(b'-')]);
     // Both restart the estimate; a picture that is saved too early is saved again.
-    let command = wait_for("picture with all changes", &mut viewer, || {
+    let command = wait_for("picture with all changes", viewer, || {
         iterated()?;
         let _ = fs::remove_file(&saved);
         display.press(&[CONTROL, u32::from(b's')]);
@@ -183,15 +231,7 @@ fn a_picture_saved_in_the_window_is_what_its_command_renders() {
         parts.iter().all(|part| command.contains(part)).then_some(command)
     });
     display.press(&[CONTROL, u32::from(b'q')]);
-    let began = Instant::now();
-    let status = loop {
-        if let Some(status) = viewer.0.try_wait().unwrap() {
-            break status;
-        }
-        assert!(began.elapsed() < PATIENCE, "it does not quit");
-        std::thread::sleep(Duration::from_millis(10));
-    };
-    let log = fs::read_to_string(&log).unwrap();
+    let (status, log) = opened.ended();
     assert!(status.success(), "{status}: {log}");
     let bad = ["panicked", "alidation", "error"];
     assert!(!bad.iter().any(|word| log.contains(word)), "{log}");
@@ -201,7 +241,7 @@ fn a_picture_saved_in_the_window_is_what_its_command_renders() {
     let path = Path::new(PROGRAM).parent().unwrap().display().to_string();
     let path = format!("{path}:{}", std::env::var("PATH").unwrap_or_default());
     let mut shell = Command::new("sh");
-    shell.arg("-c").arg(format!("{command} --backend gpu --quiet")).env("PATH", path).current_dir(folder.path());
+    shell.arg("-c").arg(format!("{command} --backend gpu --quiet")).env("PATH", path).current_dir(opened.folder.path());
     let rendered = shell.output().unwrap();
     assert!(rendered.status.success(), "{command}: {}", String::from_utf8_lossy(&rendered.stderr));
     let [kept, rendered] = [&kept, &saved].map(|path| output::exr::read(path).unwrap());

@@ -7,12 +7,12 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::error::ErrorKind;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Parser, Subcommand};
 use sunfleck::output::VERSION;
 use sunfleck::output::tonemap::ToneMap;
 use sunfleck::ppm::{Direct, FirstRadius, Kernel};
-use sunfleck::scene::settings::parse_count;
+use sunfleck::scene::settings::{MAX_SIDE, parse_count};
 
 /// Exit code of a command line that makes no sense.
 pub const USAGE: u8 = 2;
@@ -21,9 +21,6 @@ pub const USAGE: u8 = 2;
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct Usage(pub String);
-
-/// Largest side of a picture, pixels.
-const MAX_SIDE: u32 = 65_535;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -53,7 +50,7 @@ Examples:
       The scenes that come with sunfleck, and recent files.
   sunfleck view my.glb -o my.exr
       A file of yours; Ctrl+S saves my.exr.
-  sunfleck view glass --set photons=2M --iterations 100
+  sunfleck view glass -r 960x540 --photons 200k --iterations 100
       A shipped scene with settings of yours; it pauses after 100 iterations.
 
 Keys and mouse: press ? in the window.";
@@ -172,7 +169,7 @@ pub struct DeviceArgs {
     pub accel: String,
 
     /// CPU threads [default: all]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Device")]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Device")]
     pub threads: Option<u16>,
 }
 
@@ -201,19 +198,46 @@ pub struct ViewArgs {
     pub seconds: Option<f64>,
 
     /// Pause once the estimated relMSE is no more than this
-    #[arg(long, value_name = "RELMSE", allow_hyphen_values = true, value_parser = positive_f64)]
+    #[arg(long, value_name = "RELMSE", allow_hyphen_values = true, value_parser = noise)]
     pub noise: Option<f64>,
 
-    /// Camera to begin with, by name [default: the first]
-    #[arg(long, value_name = "NAME")]
+    /// Size of the picture [default: 720 high, as wide as the camera says or 1280]
+    #[arg(short, long, value_name = "WxH", value_parser = size)]
+    pub resolution: Option<[u32; 2]>,
+
+    /// Camera to begin with, by name or by number from 0 [default: the first]
+    #[arg(long, value_name = "NAME|N")]
     pub camera: Option<String>,
 
-    /// Override a key of the settings file, such as photons=2M; repeatable
+    /// Environment map: .hdr or .exr, latitude-longitude
+    #[arg(long, value_name = "FILE")]
+    pub env: Option<PathBuf>,
+
+    /// Photon paths an iteration, such as 500k or 2M [default: 500k]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = parse_count)]
+    pub photons: Option<u32>,
+
+    /// Override a key of the settings file, such as alpha=0.7 or camera.yfov_degrees=40; repeatable
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Vec<String>,
 
     #[command(flatten)]
     pub device: DeviceArgs,
+}
+
+#[cfg(feature = "view")]
+impl ViewArgs {
+    /// What the flags say over the settings, as `--set` takes it.
+    pub fn pairs(&self) -> std::io::Result<Vec<String>> {
+        let mut pairs = vec![];
+        pairs.extend(self.resolution.map(|[width, height]| format!("size=[{width}, {height}]")));
+        pairs.extend(self.camera.iter().map(|name| format!("camera.name={name:?}")));
+        if let Some(path) = &self.env {
+            pairs.push(format!("environment={{file={:?}}}", std::path::absolute(path)?.to_string_lossy()));
+        }
+        pairs.extend(self.photons.map(|n| format!("photons={n}")));
+        Ok(pairs)
+    }
 }
 
 /// What is said over the settings of a scene: picture and estimator.
@@ -264,7 +288,7 @@ pub struct InputArgs {
     pub paper: bool,
 
     /// Of the random numbers: same seed, backend and device, same picture [default: 0]
-    #[arg(long, value_name = "N", help_heading = "Estimator")]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, help_heading = "Estimator")]
     pub seed: Option<u32>,
 }
 
@@ -300,19 +324,22 @@ impl Cli {
                 ExitCode::SUCCESS
             }
             kind => {
-                crate::say_error(&usage_line(&error.to_string(), kind));
+                let first = std::env::args().nth(1).map(ContextValue::String);
+                let is_first = error.get(ContextKind::InvalidSubcommand) == first.as_ref();
+                crate::say_error(&usage_line(&error.to_string(), kind, is_first));
                 ExitCode::from(USAGE)
             }
         })
     }
 }
 
-/// clap's error in one line: what is wrong, its tips, where to read on; without its usage text.
-fn usage_line(text: &str, kind: ErrorKind) -> String {
+/// clap's error in one line: what is wrong, its tips, where to read on; without its usage text. `is_first` says that the
+/// first word of the command line is wrong.
+fn usage_line(text: &str, kind: ErrorKind, is_first: bool) -> String {
     let wrong = text.split("\nUsage:").next().unwrap_or(text);
     let wrong = wrong.split("\nFor more information").next().unwrap_or(wrong);
     let mut line = crate::one_line(wrong.trim_start_matches("error: ")).replace(" tip: ", "; ");
-    if kind == ErrorKind::InvalidSubcommand {
+    if kind == ErrorKind::InvalidSubcommand && is_first {
         line += "; to render a scene: sunfleck render SCENE -o out.png";
     }
     line
@@ -372,6 +399,14 @@ fn positive_f64(text: &str) -> Result<f64, String> {
     }
 }
 
+#[cfg(feature = "view")]
+fn noise(text: &str) -> Result<f64, String> {
+    match number::<f64>(text)? {
+        x if x > 0.0 && x.is_finite() => Ok(x),
+        _ => Err("must be above 0".into()),
+    }
+}
+
 fn exposure(text: &str) -> Result<f32, String> {
     match number::<f32>(text)? {
         x if x.abs() <= 60.0 => Ok(x),
@@ -398,11 +433,7 @@ fn radius(text: &str) -> Result<FirstRadius, String> {
 }
 
 fn tonemap() -> impl TypedValueParser<Value = ToneMap> {
-    PossibleValuesParser::new(["neutral", "agx", "srgb"]).map(|name| match name.as_str() {
-        "agx" => ToneMap::Agx,
-        "srgb" => ToneMap::Srgb,
-        _ => ToneMap::Neutral,
-    })
+    PossibleValuesParser::new(ToneMap::ALL.map(ToneMap::name)).map(|name| ToneMap::from_name(&name).unwrap_or_default())
 }
 
 fn kernel() -> impl TypedValueParser<Value = Kernel> {
@@ -441,6 +472,22 @@ mod tests {
         {
             assert!(crop(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[cfg(feature = "view")]
+    #[test]
+    fn flags_of_the_window_are_settings() {
+        let line =
+            ["sunfleck", "view", "glass", "-r", "64x48", "--photons", "2k", "--camera", "a \"b\"", "--env", "/x y.hdr"];
+        let Some(Command::View(args)) = Cli::parse_from(line).command else { panic!("another command") };
+        let mut settings = sunfleck::scene::settings::Settings::default();
+        for pair in args.pairs().unwrap() {
+            settings.set(&pair).unwrap();
+        }
+        assert_eq!(settings.size.map(|size| size.0), Some([64, 48]));
+        assert_eq!(settings.photons.map(|n| n.0), Some(2000));
+        assert_eq!(settings.camera.and_then(|camera| camera.name).as_deref(), Some("a \"b\""));
+        assert_eq!(settings.environment.and_then(|environment| environment.file).as_deref(), Some("/x y.hdr"));
     }
 
     #[test]

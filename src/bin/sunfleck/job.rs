@@ -68,11 +68,7 @@ impl Job {
             args.scene.clone().ok_or_else(|| Usage("which scene? sunfleck render SCENE -o out.png".into()))?;
         check_outputs(args)?;
         let mut source = Source::resolve(&scene_name)?;
-        let settings = &mut source.settings;
-        for pair in &args.set {
-            settings.set(pair).map_err(|e| Usage(format!("--set {pair}: {e}")))?;
-        }
-        source.locate();
+        source.set(&args.set)?;
         let settings = &source.settings;
         let iterations = args.iterations.or(settings.iterations.map(|n| n.0));
         let budget = match (iterations, args.seconds.or(settings.seconds)) {
@@ -262,7 +258,7 @@ fn same_file(a: &Path, b: &Path) -> bool {
 }
 
 /// Refuses a picture or a number of photons that this machine has no room for.
-fn check_memory(params: &Params) -> Result<()> {
+pub fn check_memory(params: &Params) -> Result<()> {
     let [width, height] = params.film_size();
     // A pixel: what the eye sees, radiance, film, radius, and two copies on the way to a file.
     let pixel = size_of::<EyeVertex>() + 12 + 16 + 4 + 2 * 16;

@@ -254,7 +254,7 @@ impl<'a> Run<'a> {
     /// "saved a.exr, b.png after 64 iterations".
     fn summary(&self) -> String {
         let files: Vec<_> = self.report.outputs.iter().map(|path| path.display().to_string()).collect();
-        let files = if files.is_empty() { "nothing".to_owned() } else { files.join(", ") };
+        let files = if files.is_empty() { "no picture".to_owned() } else { files.join(", ") };
         let n = self.film.n_iterations;
         format!("saved {files} after {n} iteration{}", if n == 1 { "" } else { "s" })
     }

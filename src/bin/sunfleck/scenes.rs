@@ -3,18 +3,21 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::SystemTime;
 
 use anyhow::{Context, Result, bail};
 use sunfleck::output::atomic;
+use sunfleck::scene::Environment;
 use sunfleck::scene::export::{self, glb_bytes};
-use sunfleck::scene::load::{Loaded, load};
+use sunfleck::scene::load::{LoadError, Loaded, load, load_environment};
 use sunfleck::scene::settings::Settings;
 use sunfleck::scene::shipped::{NAMES, shipped};
 
 use crate::cli::{ExportArgs, Usage};
 
 /// What SCENE stands for.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Source {
     /// As given.
     pub name: String,
@@ -24,6 +27,24 @@ pub struct Source {
     pub settings: Settings,
     /// Where the settings file lies.
     pub folder: PathBuf,
+    kept: Arc<Mutex<Option<Kept>>>,
+}
+
+/// An environment as its file had it: read once, though settings are applied at every edit in the window.
+#[derive(Debug)]
+struct Kept {
+    path: PathBuf,
+    stamp: Stamp,
+    environment: Environment,
+    warnings: Vec<String>,
+}
+
+/// Changes when a file is written to: bytes, and when.
+type Stamp = (u64, Option<SystemTime>);
+
+fn stamp(path: &Path) -> Option<Stamp> {
+    let metadata = std::fs::metadata(path).ok()?;
+    Some((metadata.len(), metadata.modified().ok()))
 }
 
 impl Source {
@@ -33,18 +54,27 @@ impl Source {
         if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
             check_name(scene)?;
             let name = scene.to_owned();
-            return Ok(Self { name, file: path.to_owned(), settings: Settings::default(), folder: PathBuf::new() });
+            return Ok(Self { name, file: path.to_owned(), ..Self::default() });
         }
         let settings = Settings::load(path)?;
         settings.scene.as_ref().with_context(|| format!("{scene}: scene: is missing: it names a file"))?;
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        let mut source = Self { name: scene.to_owned(), file: PathBuf::new(), settings, folder };
+        let mut source = Self { name: scene.to_owned(), settings, folder, ..Self::default() };
         source.locate();
         Ok(source)
     }
 
-    /// Finds the scene that the settings name: again, once they were overridden.
-    pub fn locate(&mut self) {
+    /// Overrides settings, each `field=value` as `--set` takes it.
+    pub fn set(&mut self, pairs: &[String]) -> Result<()> {
+        for pair in pairs {
+            self.settings.set(pair).map_err(|e| Usage(format!("--set {pair}: {e}")))?;
+        }
+        self.locate();
+        Ok(())
+    }
+
+    /// Finds the scene that the settings name.
+    fn locate(&mut self) {
         if let Some(named) = &self.settings.scene {
             let beside = self.folder.join(named);
             self.file = if !beside.exists() && NAMES.contains(&named.as_str()) { named.into() } else { beside };
@@ -73,9 +103,28 @@ impl Source {
 
     /// Changes a scene as `settings` say, whose files lie where the settings file does.
     pub fn apply(&self, settings: &Settings, loaded: &mut Loaded) -> Result<()> {
-        let warnings = settings.apply_to_scene(&mut loaded.scene, &self.folder).with_context(|| self.name.clone())?;
+        let warnings = settings
+            .apply_with(&mut loaded.scene, &self.folder, &mut |path| self.environment(path))
+            .with_context(|| self.name.clone())?;
         loaded.warnings.extend(warnings);
         Ok(())
+    }
+
+    /// Reads an environment, unless it was the last one read and its file is as it was.
+    fn environment(&self, path: &Path) -> Result<(Environment, Vec<String>), LoadError> {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let now = stamp(path);
+        if let Some(kept) = kept.as_ref().filter(|kept| kept.path == path && Some(&kept.stamp) == now.as_ref()) {
+            return Ok((kept.environment.clone(), kept.warnings.clone()));
+        }
+        let (environment, warnings) = load_environment(path)?;
+        *kept = now.map(|stamp| Kept {
+            path: path.to_owned(),
+            stamp,
+            environment: environment.clone(),
+            warnings: warnings.clone(),
+        });
+        Ok((environment, warnings))
     }
 }
 
@@ -166,6 +215,26 @@ mod tests {
     #[test]
     fn every_scene_has_a_line() {
         assert!(NAMES.iter().all(|name| !describe(name).is_empty()));
+    }
+
+    #[test]
+    fn an_environment_is_read_again_only_if_its_file_changed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("sky.hdr");
+        let sky = |radiance: f32| Environment::uniform(glam::Vec3::splat(radiance));
+        export::write_environment_hdr(&sky(1.0), &path).unwrap();
+        let source = Source::resolve("cornell").unwrap();
+        let texel = || source.environment(&path).unwrap().0.texels[0].x;
+        assert_eq!(texel(), 1.0);
+        // What is kept is what comes, as long as the file is the same.
+        source.kept.lock().unwrap().as_mut().unwrap().environment = sky(4.0);
+        assert_eq!(texel(), 4.0);
+        export::write_environment_hdr(&sky(2.0), &path).unwrap();
+        let file = std::fs::File::options().write(true).open(&path).unwrap();
+        file.set_modified(SystemTime::UNIX_EPOCH).unwrap();
+        assert_eq!(texel(), 2.0);
+        std::fs::remove_file(&path).unwrap();
+        assert!(source.environment(&path).is_err());
     }
 
     #[test]

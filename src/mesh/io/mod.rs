@@ -99,7 +99,9 @@ pub fn read(path: &Path) -> Result<Loaded, Error> {
         "ply" => read_ply(file, size),
         "stl" => read_stl(file, size),
         "off" => read_off(file),
-        _ => Err(format!("the extension {extension:?} is none of .obj, .ply, .stl, .off, .node and .face")),
+        _ => {
+            Err(format!("the extension {extension:?} is none of .obj, .ply, .stl, .off, .gltf, .glb, .node and .face"))
+        }
     };
     loaded.map_err(fail)
 }

@@ -119,7 +119,7 @@ pub fn load(path: &Path) -> Result<Loaded, LoadError> {
     if !matches!(extension.as_str(), "gltf" | "glb" | "obj") {
         // Say "no such file" before "unknown extension".
         files::check_regular(path).map_err(|problem| LoadError::Unreadable { file: path.into(), problem })?;
-        let problem = format!("the extension {extension:?} is none of .gltf, .glb and .obj");
+        let problem = format!("the extension {extension:?} is none of .gltf, .glb and .obj (settings: .toml)");
         return Err(LoadError::Format { file: path.into(), problem });
     }
     let (source, bytes) = Source::open(path)?;

@@ -1,8 +1,8 @@
 //! Checking of settings by themselves, and what they do to a scene.
 
 use super::{
-    CameraSettings, EnvironmentSettings, FirstRadius, LightKind, LightSettings, Settings, SettingsError, Size,
-    SphereSettings, Wrong,
+    CameraSettings, EnvironmentSettings, FirstRadius, LightKind, LightSettings, MAX_SIDE, ReadEnvironment, Settings,
+    SettingsError, Size, SphereSettings, Wrong,
 };
 use crate::scene::load::load_environment;
 use crate::scene::{
@@ -11,9 +11,6 @@ use crate::scene::{
 };
 use glam::{Affine3A, Vec3};
 use std::path::Path;
-
-/// Width and height of a picture, at most.
-const MAX_SIDE: u32 = 16_384;
 
 /// Collects the first wrong value.
 pub(super) struct Checks(Result<(), Wrong>);
@@ -114,6 +111,16 @@ impl Settings {
     ///
     /// `folder` is where the settings file lies. Returns warnings.
     pub fn apply_to_scene(&self, scene: &mut Scene, folder: &Path) -> Result<Vec<String>, SettingsError> {
+        self.apply_with(scene, folder, &mut load_environment)
+    }
+
+    /// The same, with environments from `read` instead of their files: for one who has read them before.
+    pub fn apply_with(
+        &self,
+        scene: &mut Scene,
+        folder: &Path,
+        read: &mut ReadEnvironment<'_>,
+    ) -> Result<Vec<String>, SettingsError> {
         let wrong = |(field, problem): Wrong| SettingsError::Field { field, problem };
         self.check_values().map_err(wrong)?;
         let mut warnings = Vec::new();
@@ -128,7 +135,7 @@ impl Settings {
         }
         scene.lights.extend(self.lights.iter().enumerate().map(|(i, light)| light.light(i)));
         if let Some(environment) = &self.environment {
-            warnings.extend(environment.apply(scene, folder)?);
+            warnings.extend(environment.apply(scene, folder, read)?);
         }
         if let Some(factor) = self.light_scale {
             scale_lights(scene, factor);
@@ -191,11 +198,13 @@ impl CameraSettings {
     fn apply(&self, scene: &mut Scene) -> Result<(), Wrong> {
         let chosen = match &self.name {
             None => (!scene.cameras.is_empty()).then_some(0),
-            Some(name) => match scene.cameras.iter().position(|camera| camera.name == *name) {
+            Some(name) => match position(&scene.cameras, name) {
                 Some(found) => Some(found),
                 None => {
-                    let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
-                    let problem = format!("there is no camera {name:?}; there are {names:?}");
+                    let list: Vec<_> =
+                        scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} {:?}", c.name)).collect();
+                    let list = if list.is_empty() { "none".to_owned() } else { list.join(", ") };
+                    let problem = format!("there is no camera {name:?}; there is {list}");
                     return Err(("camera.name".into(), problem));
                 }
             },
@@ -234,6 +243,12 @@ impl CameraSettings {
     }
 }
 
+/// The camera of that name, else of that number.
+fn position(cameras: &[Camera], name: &str) -> Option<usize> {
+    let by_name = cameras.iter().position(|camera| camera.name == name);
+    by_name.or_else(|| name.parse().ok().filter(|index| *index < cameras.len()))
+}
+
 fn orient(position: Vec3, forward: Vec3, up: Vec3) -> Affine3A {
     // A camera may look straight up.
     let up = if up.cross(forward).length() > 1e-4 { up } else { forward.any_orthonormal_vector() };
@@ -242,11 +257,16 @@ fn orient(position: Vec3, forward: Vec3, up: Vec3) -> Affine3A {
 
 impl EnvironmentSettings {
     /// Returns warnings.
-    fn apply(&self, scene: &mut Scene, folder: &Path) -> Result<Vec<String>, SettingsError> {
+    fn apply(
+        &self,
+        scene: &mut Scene,
+        folder: &Path,
+        read: &mut ReadEnvironment<'_>,
+    ) -> Result<Vec<String>, SettingsError> {
         let mut warnings = Vec::new();
         let mut environment = match (&self.file, self.color) {
             (Some(file), _) => {
-                let (environment, more) = load_environment(&folder.join(file))?;
+                let (environment, more) = read(&folder.join(file))?;
                 warnings.extend(more);
                 environment
             }

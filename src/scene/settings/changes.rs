@@ -166,7 +166,10 @@ fn own_name<'n>(names: impl Iterator<Item = &'n str> + Clone, index: usize) -> O
 }
 
 fn check_target(c: &mut Checks, place: &str, name: Option<&String>, index: Option<usize>) {
-    c.require(name.is_some() != index.is_some(), place, || "needs a name or an index, and not both".into());
+    c.require(name.is_some() != index.is_some(), place, || {
+        let list = place.split('[').next().unwrap_or(place);
+        format!("needs the name or the index of one of the scene's, and not both (--set {list}.NAME.… gives the name)")
+    });
 }
 
 /// The things that `name` or `index` mean, at least one.

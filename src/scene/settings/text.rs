@@ -181,10 +181,10 @@ fn position(list: &[Value], part: &str) -> Result<usize, String> {
     let n = list.len();
     match part.parse::<usize>() {
         Ok(index) if index < n => Ok(index),
-        Ok(index) => Err(format!("there is no number {index}: there are {n}, from 0")),
+        Ok(index) => Err(format!("there is no number {index}: the settings have {n} of these, counted from 0")),
         Err(_) => {
             let found = list.iter().position(|item| has_name(item, part));
-            found.ok_or_else(|| format!("{part:?} is neither a number nor a name here: there are {n}"))
+            found.ok_or_else(|| format!("{part:?} is neither a number nor a name here: the settings have {n} of these"))
         }
     }
 }

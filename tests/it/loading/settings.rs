@@ -173,6 +173,10 @@ fn cameras_and_materials_by_name() {
     let mut scene = Glb::triangle().scene();
     let message = settings("[camera]\nname = \"side\"").apply_to_scene(&mut scene, folder.0.path());
     assert!(message.unwrap_err().to_string().contains("camera.name: there is no camera \"side\""));
+    scene.cameras = vec![sunfleck::scene::Camera::look_at("front", Vec3::Z, Vec3::ZERO, Vec3::Y, 1.0)];
+    let message = settings("[camera]\nname = \"7\"").apply_to_scene(&mut scene, folder.0.path());
+    assert!(message.unwrap_err().to_string().contains("there is no camera \"7\"; there is 0 \"front\""));
+    settings("[camera]\nname = \"0\"").apply_to_scene(&mut scene, folder.0.path()).unwrap();
     let text = "[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\nmaterial = \"gold\"";
     let message = settings(text).apply_to_scene(&mut scene, folder.0.path()).unwrap_err().to_string();
     assert!(message.contains("sphere[0].material") && message.contains("\"default\""), "{message}");

@@ -299,7 +299,7 @@ fn files_are_found_and_told_apart() {
     // The one that is missing is named.
     assert!(matches!(read(&node), Err(Error::File { path, .. }) if path == face));
     for (name, expected) in
-        [("none.obj", "entity not found"), ("x.txt", "is none of .obj, .ply"), (".", "not a regular file")]
+        [("none.obj", "No such file or directory"), ("x.txt", "is none of .obj, .ply"), (".", "not a regular file")]
     {
         if name == "x.txt" {
             put(name, b"");

@@ -60,7 +60,7 @@ fn the_verdict_is_the_exit_code() {
     expect(&two, &["--no-intersections"], 1, &["rays contradict", "not looked for", "disputed"]);
     for (args, code, text) in [
         (&[][..], 2, "MESH"),
-        (&["no.obj"], 1, "no.obj: entity not found"),
+        (&["no.obj"], 1, "no.obj: No such file or directory"),
         (&[name, "--fix"], 2, "--output <OUT>"),
         (&[name, "-o", "b.obj"], 2, "--fix"),
         (&[name, "--fix", "-o", "b.xyz"], 2, "b.xyz: meshes are written as"),

@@ -388,7 +388,7 @@ fn the_program_refuses_in_one_line() {
     for (line, code, says) in [
         ("normals two.xyz -o o.ply", 1, "two.xyz: 2 points: a normal needs at least 3"),
         ("normals bad.ply -o o.ply", 1, "bad.ply: the header's element vertex lacks"),
-        ("normals none.ply -o o.ply", 1, "none.ply: entity not found"),
+        ("normals none.ply -o o.ply", 1, "none.ply: No such file or directory"),
         ("normals two.xyz -o o.obj", 2, "clouds are written as .ply"),
         ("normals two.xyz -o no/o.ply", 1, "there is no folder no"),
         ("normals two.xyz -o o.ply -k 65", 2, "must be 3 to 64"),

@@ -45,11 +45,11 @@ pub struct IndicesArgs {
     rounds: Rounds,
 
     /// Photons, and uniform points [default: 500k and 1M]
-    #[arg(long, value_name = "N", value_parser = count)]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
     samples: Option<usize>,
 
     /// Queries [default: 1920x1080 on photons, 32768 on uniform points]
-    #[arg(long, value_name = "N", value_parser = count)]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = count)]
     queries: Option<usize>,
 
     /// Only these cases

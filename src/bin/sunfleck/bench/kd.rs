@@ -49,11 +49,11 @@ pub struct KdArgs {
     rounds: Rounds,
 
     /// Numbers of faces the asteroid is scaled to [default: 1,000 to the thesis' 140,296]
-    #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = count)]
+    #[arg(long, value_name = "N,…", value_delimiter = ',', allow_hyphen_values = true, value_parser = count)]
     faces: Vec<usize>,
 
     /// How often the sphere's faces are split in four: 20·4^N faces [default: 2,3,4,5,6]
-    #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(0..=9))]
+    #[arg(long, value_name = "N,…", value_delimiter = ',', allow_hyphen_values = true, value_parser = clap::value_parser!(u32).range(0..=9))]
     levels: Vec<u32>,
 
     /// Scale this mesh in place of the asteroid: .obj, .ply, .stl, .off, or TetGen's .node or .face

@@ -26,6 +26,8 @@ mod report;
 mod search;
 mod sorted;
 mod thesis;
+#[cfg(feature = "view")]
+mod view;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -45,16 +47,17 @@ Examples:
       Radius search on uniform and clustered points, in less than a minute.
   sunfleck bench search --threads 1 --rounds 9 -o results
       All of it, which takes its time.
-
   sunfleck bench photons --iterations 5 -o results
       The paper's Table 1 on this machine; its 50 iterations take hours without a GPU.
   sunfleck bench kd --mesh eros.obj -o results
       Builders of kd-trees in the mesh check, over a mesh split and simplified from 1,000 to 140,296 faces.
+  sunfleck bench view --backend gpu -o results
+      Whether the window stays smooth; needs a display.
 
 Into the folder go NAME.json, NAME.csv and an .svg for each figure; the tables are printed too.";
 
 #[derive(Debug, Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, arg_required_else_help = false)]
 pub struct BenchArgs {
     /// What to measure
     #[command(subcommand)]
@@ -73,6 +76,9 @@ enum Benchmark {
     Indices(indices::IndicesArgs),
     /// kd-trees over triangles in the mesh check (Figures 7.2 to 7.8 of the thesis on them)
     Kd(kd::KdArgs),
+    /// Frames of the window while the heaviest shipped scene renders behind it
+    #[cfg(feature = "view")]
+    View(view::ViewBenchArgs),
 }
 
 /// Of the benchmarks that search on several devices.
@@ -95,11 +101,11 @@ struct Common {
     quick: bool,
 
     /// CPU threads [default: all]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
 
-    /// Of the random points, and of the asteroid
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    /// Of the random numbers
+    #[arg(long, value_name = "N", allow_hyphen_values = true, default_value_t = 0)]
     seed: u32,
 
     /// Say nothing but errors while measuring
@@ -110,7 +116,7 @@ struct Common {
 #[derive(Debug, Args)]
 struct Rounds {
     /// Rounds that count, after one that does not
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     rounds: u32,
 }
 
@@ -121,6 +127,8 @@ pub fn run(args: &BenchArgs) -> Result<ExitCode> {
         Benchmark::Photons(args) => photons::run(args)?,
         Benchmark::Indices(args) => indices::run(args)?,
         Benchmark::Kd(args) => kd::run(args)?,
+        #[cfg(feature = "view")]
+        Benchmark::View(args) => view::run(args)?,
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -188,9 +196,15 @@ fn length(text: &str) -> Result<f32, String> {
     }
 }
 
+/// Points, queries or faces, at most: every index over as many, side by side, still fits into a large machine.
+const MOST: u32 = 20_000_000;
+
 /// How many points.
 fn count(text: &str) -> Result<usize, String> {
-    parse_count(text).map(|n| n as usize)
+    match parse_count(text)? {
+        n if n <= MOST => Ok(n as usize),
+        _ => Err("at most 20M".into()),
+    }
 }
 
 /// "100K", "2M".

@@ -33,7 +33,7 @@ use super::report::{self, Machine, Report, Row};
 use super::{Common, Steps, Where, backends, paper, short};
 use crate::cli::Usage;
 use crate::devices::{self, Device};
-use crate::job::{Input, use_paper_mode};
+use crate::job::{Input, check_memory, use_paper_mode};
 use crate::render;
 
 const NOTES: &[&str] = &[
@@ -52,7 +52,7 @@ pub struct PhotonsArgs {
     scene: Vec<String>,
 
     /// Photon paths an iteration [default: the paper's 100k,200k,500k,1M]
-    #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = parse_count)]
+    #[arg(long, value_name = "N,…", value_delimiter = ',', allow_hyphen_values = true, value_parser = parse_count)]
     photons: Vec<u32>,
 
     /// Size of the picture [default: the paper's 1920x1080]
@@ -60,7 +60,7 @@ pub struct PhotonsArgs {
     resolution: Option<[u32; 2]>,
 
     /// Iterations that count, after one that does not [default: the paper's 50]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     iterations: Option<u32>,
 
     #[command(flatten)]
@@ -251,6 +251,7 @@ fn measure(
     if !args.normal_mode {
         use_paper_mode(&mut params);
     }
+    check_memory(&params)?;
     let input = Input { scene, camera, params, warnings: vec![] };
     let packed = PackedScene::new(&input.scene);
     let mut runners = Vec::new();

@@ -47,7 +47,7 @@ pub struct PointsArgs {
     place: Where,
 
     /// Sizes of the clouds [default: the paper's, 100k,350k,500k,1M]
-    #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = count)]
+    #[arg(long, value_name = "N,…", value_delimiter = ',', allow_hyphen_values = true, value_parser = count)]
     points: Vec<usize>,
 }
 

@@ -46,11 +46,11 @@ pub struct SearchArgs {
     place: Where,
 
     /// Numbers of samples, instead of the paper's low and high density
-    #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = count)]
+    #[arg(long, value_name = "N,…", value_delimiter = ',', allow_hyphen_values = true, value_parser = count)]
     samples: Vec<usize>,
 
     /// Numbers of queries [default: those of the samples]
-    #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = count)]
+    #[arg(long, value_name = "N,…", value_delimiter = ',', allow_hyphen_values = true, value_parser = count)]
     queries: Vec<usize>,
 
     /// Radii, in sides of the unit cube

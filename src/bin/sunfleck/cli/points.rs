@@ -51,7 +51,7 @@ pub struct Common {
     #[arg(short, long, value_name = "OUT.ply")]
     pub output: PathBuf,
     /// CPU threads [default: all]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Say nothing but results and errors
     #[arg(short, long)]
@@ -130,7 +130,7 @@ pub struct MakeArgs {
     #[arg(long, value_name = "LENGTH", default_value = "0.0005", allow_hyphen_values = true, value_parser = noise)]
     pub noise: f64,
     /// Of the random numbers: another scan of the same surface
-    #[arg(long, value_name = "N", default_value = "0")]
+    #[arg(long, value_name = "N", allow_hyphen_values = true, default_value = "0")]
     pub seed: u32,
     /// Turn the cloud about the axis (1, 2, 3), degrees
     #[arg(long, value_name = "DEGREES", default_value = "0", allow_hyphen_values = true, value_parser = finite)]

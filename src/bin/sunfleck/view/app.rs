@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
 use eframe::egui;
@@ -15,6 +15,7 @@ use super::files;
 use super::picture::PictureView;
 use super::state::{Edits, Remembered};
 use crate::cli::{Usage, ViewArgs};
+use crate::scenes::Source;
 
 /// Key of what is remembered.
 const REMEMBERED: &str = "remembered";
@@ -38,10 +39,15 @@ impl First {
             crate::job::check_output(path)?;
         }
         let mut set = args.set.clone();
-        set.extend(args.camera.iter().map(|name| format!("camera.name={name:?}")));
-        let choice = args.scene.clone().map(|name| Choice { name, set });
-        if choice.is_none() && !args.set.is_empty() {
-            bail!(Usage("--set changes a scene: which one?".into()));
+        set.extend(args.pairs()?);
+        let choice = match &args.scene {
+            Some(name) => Some(Choice { name: name.clone(), set }),
+            None if set.is_empty() => None,
+            None => bail!(Usage(format!("{}: of which scene? sunfleck view SCENE", set[0]))),
+        };
+        // What is typed wrong is said where it was typed.
+        if let Some(choice) = &choice {
+            Source::resolve(&choice.name)?.set(&choice.set)?;
         }
         let limits = Limits { iterations: args.iterations, seconds: args.seconds, noise: args.noise };
         Ok(Self { choice, limits, output: args.output.clone(), reference: args.reference.clone() })
@@ -57,6 +63,8 @@ pub struct Viewer {
     pub now: Now,
     pub edits: Edits,
     pub remembered: Remembered,
+    /// Whether it has been in a window.
+    entered: bool,
     pub picture: PictureView,
     pub inspect: super::inspect::InspectView,
     pub compare: super::compare::CompareView,
@@ -85,8 +93,7 @@ pub struct Viewer {
 }
 
 impl Viewer {
-    pub fn new(storage: Option<&dyn eframe::Storage>, engine: Engine, wake: Wake, first: First) -> Self {
-        let remembered = storage.and_then(|storage| eframe::get_value(storage, REMEMBERED)).unwrap_or_default();
+    pub fn new(engine: Engine, wake: Wake, first: First) -> Self {
         let wanted = Wanted { scene: first.choice.map(Arc::new), limits: first.limits, ..Wanted::default() };
         let now = engine.now();
         Self {
@@ -94,7 +101,8 @@ impl Viewer {
             wanted,
             now,
             edits: Edits::default(),
-            remembered,
+            remembered: Remembered::default(),
+            entered: false,
             picture: PictureView::default(),
             inspect: Default::default(),
             compare: Default::default(),
@@ -114,6 +122,26 @@ impl Viewer {
             wake,
             editing: None,
         }
+    }
+
+    /// Comes into a window: the first one, or another after that was lost, which has none of the textures and a clock of
+    /// its own.
+    pub fn enter(&mut self, storage: Option<&dyn eframe::Storage>) {
+        if !std::mem::replace(&mut self.entered, true) {
+            self.remembered = storage.and_then(|storage| eframe::get_value(storage, REMEMBERED)).unwrap_or_default();
+            self.wanted.painting.look.tonemap = self.remembered.tone();
+            return;
+        }
+        self.picture.forget();
+        self.compare.forget();
+        (self.start, self.timing, self.title) = (Default::default(), Default::default(), String::new());
+        self.messages.iter_mut().for_each(|(when, _)| *when = 0.0);
+    }
+
+    /// Keeps what is to be remembered.
+    pub fn save(&self, storage: &mut dyn eframe::Storage) {
+        let tone = self.wanted.painting.look.tonemap.name().to_owned();
+        eframe::set_value(storage, REMEMBERED, &Remembered { tone, ..self.remembered.clone() });
     }
 
     /// Opens a file, or a shipped scene by its name.
@@ -239,12 +267,30 @@ impl Viewer {
 
     /// Writes the picture to `path`, as it looks now.
     pub fn save_to(&mut self, path: PathBuf) {
-        self.engine.save(Save { path, look: self.wanted.painting.look });
+        self.engine.save(self.saving_to(path));
+    }
+
+    /// The picture as it looks now, to be written to `path`.
+    pub fn saving_to(&self, path: PathBuf) -> Save {
+        Save { path, look: self.wanted.painting.look }
     }
 
     /// Shows a message.
     pub fn say(&mut self, ui: &egui::Ui, message: Message) {
         self.messages.push((ui.input(|i| i.time), message));
+    }
+
+    /// What is being told.
+    #[cfg(test)]
+    pub fn messages(&self) -> impl Iterator<Item = &str> {
+        self.messages.iter().map(|(_, message)| match message {
+            Message::Said(text) | Message::Warning(text) | Message::Error(text) => text.as_str(),
+        })
+    }
+
+    /// The same in the next window.
+    pub fn tell(&mut self, message: Message) {
+        self.messages.push((0.0, message));
     }
 
     /// Asks for another frame, from any thread.
@@ -256,8 +302,11 @@ impl Viewer {
         &self.engine
     }
 
-    /// One frame.
-    pub fn show(&mut self, ui: &mut egui::Ui) {
+    /// One frame. `last` is what the one before took the interface thread, seconds.
+    pub fn show(&mut self, ui: &mut egui::Ui, last: Option<f32>) {
+        if let Some(took) = last.and_then(|seconds| Duration::try_from_secs_f32(seconds).ok()) {
+            self.timing.frame(took);
+        }
         let began = Instant::now();
         self.look_at_engine(ui);
         let wanted = self.wanted.clone();
@@ -265,6 +314,7 @@ impl Viewer {
         if let Some(path) = self.reference.take() {
             super::compare::load(ui, self, &path);
         }
+        self.look_at_reference(ui);
         super::keys::handle(ui, self);
         egui::Panel::top("bar").show(ui, |ui| super::bar::show(ui, self));
         egui::Panel::bottom("status").show(ui, |ui| super::bar::status(ui, self));
@@ -297,7 +347,6 @@ impl Viewer {
             self.timing.ask(began, self.now.estimate);
         }
         self.engine.want(&self.wanted);
-        self.timing.frame(began.elapsed());
     }
 
     fn look_at_engine(&mut self, ui: &egui::Ui) {
@@ -389,15 +438,5 @@ impl Viewer {
         if let Some(end) = passing.map(|(when, _)| when + MESSAGE_SECONDS).reduce(f64::min) {
             ui.ctx().request_repaint_after_secs((end - now).max(0.0) as f32);
         }
-    }
-}
-
-impl eframe::App for Viewer {
-    fn ui(&mut self, ui: &mut egui::Ui, _: &mut eframe::Frame) {
-        self.show(ui);
-    }
-
-    fn save(&mut self, storage: &mut dyn eframe::Storage) {
-        eframe::set_value(storage, REMEMBERED, &self.remembered);
     }
 }

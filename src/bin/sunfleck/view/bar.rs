@@ -207,7 +207,8 @@ pub fn status(ui: &mut egui::Ui, viewer: &Viewer) {
         };
         ui.label(phase);
         if let Phase::Failed(error) = &now.phase {
-            ui.colored_label(ui.visuals().error_fg_color, error);
+            let text = egui::RichText::new(error).color(ui.visuals().error_fg_color);
+            ui.add(egui::Label::new(text).truncate());
         }
         if let Some(frame) = &now.frame {
             let [width, height] = frame.params.size;

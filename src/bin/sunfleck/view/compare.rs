@@ -23,11 +23,20 @@ pub struct CompareView {
     /// Where the line is, share of the picture's width.
     wipe: f32,
     texture: Option<(Made, egui::TextureHandle)>,
+    /// The reference that was last looked at.
+    seen: Option<Arc<Reference>>,
 }
 
 impl Default for CompareView {
     fn default() -> Self {
-        Self { wipe: 0.5, texture: None }
+        Self { wipe: 0.5, texture: None, seen: None }
+    }
+}
+
+impl CompareView {
+    /// The texture is of a window that is gone.
+    pub fn forget(&mut self) {
+        self.texture = None;
     }
 }
 
@@ -78,11 +87,41 @@ fn describe(comparison: Comparison) -> (&'static str, &'static str) {
 }
 
 impl Viewer {
-    /// The next of the list, from the last to the first.
-    pub fn next_comparison(&mut self) {
+    /// The next of the list, from the last to the first; says so if there is nothing to compare with.
+    pub fn next_comparison(&mut self, ui: &egui::Ui) {
+        if let Some(why) = self.no_comparison() {
+            self.say(ui, Message::Warning(why));
+            return;
+        }
         let wanted = &mut self.wanted.painting.comparison;
         let mut following = comparisons().cycle().skip_while(|comparison| comparison != wanted).skip(1);
         *wanted = following.next().unwrap_or_default();
+    }
+
+    /// Why the picture cannot be compared.
+    fn no_comparison(&self) -> Option<String> {
+        match &self.now.reference {
+            Some(reference) => unfit(reference, self.full_size()?),
+            None => Some("nothing to compare with: open or drop an .exr, or pin the picture".to_owned()),
+        }
+    }
+
+    /// Says it of a reference that is new.
+    pub fn look_at_reference(&mut self, ui: &egui::Ui) {
+        let reference = self.now.reference.clone();
+        let is_same = match (&self.compare.seen, &reference) {
+            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+            (None, None) => true,
+            _ => false,
+        };
+        // The picture's size is known once there is a scene.
+        if is_same || reference.is_some() && self.full_size().is_none() {
+            return;
+        }
+        if let (Some(_), Some(why)) = (&reference, self.no_comparison()) {
+            self.say(ui, Message::Warning(why));
+        }
+        self.compare.seen = reference;
     }
 }
 

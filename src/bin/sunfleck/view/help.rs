@@ -20,20 +20,30 @@ const HAND: &[(&str, &str)] = &[
     ("Shift held", "show the reference"),
 ];
 
+/// Room that two columns need, points.
+const TWO_COLUMNS: f32 = 900.0;
+
 /// The window with the help, if it is asked for.
 pub fn show(ui: &egui::Ui, viewer: &mut Viewer) {
     let mut open = viewer.show_help;
-    egui::Window::new("Keys and mouse").open(&mut open).collapsible(false).vscroll(true).show(ui.ctx(), |ui| {
-        egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
-            for (hand, what) in HAND {
-                ui.strong(*hand);
-                ui.label(*what);
-                ui.end_row();
-            }
-            for shortcut in SHORTCUTS {
-                ui.strong(ui.ctx().format_shortcut(&shortcut.keys));
-                ui.label(shortcut.what);
-                ui.end_row();
+    // All of it in sight where the window has room for two columns.
+    let room = ui.ctx().content_rect().shrink(48.0);
+    let window = egui::Window::new("Keys and mouse").open(&mut open).collapsible(false).scroll(true);
+    let window = window.default_size(room.size()).max_size(room.size()).default_pos(room.left_top());
+    window.show(ui.ctx(), |ui| {
+        let hand = HAND.iter().map(|(hand, what)| ((*hand).to_owned(), *what));
+        let keys = SHORTCUTS.iter().map(|shortcut| (ui.ctx().format_shortcut(&shortcut.keys), shortcut.what));
+        let lines: Vec<_> = hand.chain(keys).collect();
+        let n_columns = if room.width() >= TWO_COLUMNS { 2 } else { 1 };
+        ui.horizontal_top(|ui| {
+            for (i, part) in lines.chunks(lines.len().div_ceil(n_columns)).enumerate() {
+                egui::Grid::new(("keys", i)).num_columns(2).striped(true).show(ui, |ui| {
+                    for (keys, what) in part {
+                        ui.strong(keys);
+                        ui.label(*what);
+                        ui.end_row();
+                    }
+                });
             }
         });
     });

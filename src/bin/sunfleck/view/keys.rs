@@ -53,7 +53,7 @@ pub const SHORTCUTS: &[Shortcut] = &[
     key(Key::E, "half a stop brighter", |_, v| v.expose(0.5)),
     key(Key::X, "automatic exposure", |_, v| v.wanted.painting.look.exposure = None),
     key(Key::T, "next tone curve", |_, v| v.next_tone()),
-    key(Key::C, "next comparison with the reference", |_, v| v.next_comparison()),
+    key(Key::C, "next comparison with the reference", |ui, v| v.next_comparison(ui)),
     key(Key::Space, "restart", |_, v| v.restart()),
     key(Key::P, "pause, go on", |_, v| v.wanted.paused = !v.wanted.paused),
     key(Key::N, "one iteration, then pause", |_, v| v.step()),
@@ -87,6 +87,11 @@ pub fn handle(ui: &mut egui::Ui, viewer: &mut Viewer) {
     if ui.ctx().egui_wants_keyboard_input() || flying {
         return;
     }
+    let modified = |event: &egui::Event| match event {
+        egui::Event::Key { key, pressed: true, modifiers, .. } if modifiers.command || modifiers.alt => Some(*key),
+        _ => None,
+    };
+    ui.input(|i| viewer.picture.not_flying.extend(i.events.iter().filter_map(modified)));
     for shortcut in SHORTCUTS {
         // A question mark needs Shift on most keyboards.
         let keys = shortcut.keys;

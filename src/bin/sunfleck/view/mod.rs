@@ -1,6 +1,7 @@
 //! `sunfleck view`: the window that shows a render converge.
 //!
-//! `engine` renders and paints, and knows nothing of the window; `Viewer` is the window; every panel is a function of it.
+//! `engine` renders and paints, and knows nothing of the window; `Viewer` is what is in the window, every panel a function
+//! of it; `window` opens it.
 
 mod app;
 mod bar;
@@ -14,6 +15,7 @@ mod files;
 mod help;
 mod inspect;
 mod keys;
+pub mod measure;
 mod picture;
 mod settings;
 mod start;
@@ -21,45 +23,24 @@ mod state;
 #[cfg(test)]
 mod tests;
 mod timing;
+mod window;
 
 use std::process::ExitCode;
-use std::sync::Arc;
 
-use anyhow::{Result, anyhow};
-use eframe::egui;
+use anyhow::Result;
 
 use crate::cli::ViewArgs;
 use crate::devices;
 use crate::progress::Progress;
 use app::Viewer;
 
-/// Where eframe keeps what is remembered, and what the window manager knows the window by.
-const APP_ID: &str = "sunfleck";
-
 pub fn run(args: &ViewArgs) -> Result<ExitCode> {
     devices::use_threads(args.device.threads)?;
     let device = devices::open(&args.device, &Progress::new(false))?;
     let first = app::First::resolve(args)?;
-    let options = eframe::NativeOptions {
-        viewport: egui::ViewportBuilder::default()
-            .with_app_id(APP_ID)
-            .with_title("Sunfleck")
-            .with_inner_size([1280.0, 720.0])
-            .with_min_inner_size([480.0, 320.0])
-            .with_drag_and_drop(true),
-        renderer: eframe::Renderer::Wgpu,
-        ..Default::default()
-    };
-    eframe::run_native(
-        APP_ID,
-        options,
-        Box::new(|creation| {
-            let context = creation.egui_ctx.clone();
-            let wake: engine::Wake = Arc::new(move || context.request_repaint());
-            let engine = engine::Engine::start(device, Arc::clone(&wake))?;
-            Ok(Box::new(Viewer::new(creation.storage, engine, wake, first)))
-        }),
-    )
-    .map_err(|error| anyhow!("no window: {error}"))?;
+    let bell = window::Bell::default();
+    let engine = engine::Engine::start(device, bell.wake())?;
+    let mut viewer = Viewer::new(engine, bell.wake(), first);
+    window::run(&mut viewer, &bell, window::options, &mut ())?;
     Ok(ExitCode::SUCCESS)
 }

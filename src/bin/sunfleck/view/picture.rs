@@ -39,6 +39,8 @@ pub struct PictureView {
     moved: Option<f64>,
     /// Whether keys move the camera.
     pub flying: bool,
+    /// Keys that were pressed with Ctrl or Alt: they do not move the camera though the modifier is let go first.
+    pub not_flying: Vec<Key>,
     /// Pixel under the cursor.
     pub hovered: Option<[usize; 2]>,
     /// Where the picture is, points.
@@ -257,7 +259,8 @@ fn move_camera(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, response: &egui::
     }
     let typing = ui.ctx().egui_wants_keyboard_input();
     let was_flying = viewer.picture.flying;
-    let direction = if typing { Vec3::ZERO } else { ui.input(|i| flight(i, was_flying)) };
+    let not_flying = &mut viewer.picture.not_flying;
+    let direction = if typing { Vec3::ZERO } else { ui.input(|i| flight(i, was_flying, not_flying)) };
     viewer.picture.flying = direction != Vec3::ZERO;
     if direction != Vec3::ZERO {
         let (pace, seconds) = ui.input(|i| {
@@ -284,14 +287,17 @@ fn move_camera(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, response: &egui::
     }
 }
 
-/// x to the right, y up, z forward. Keys with Ctrl are shortcuts, and E alone is one, unless the camera flies already.
-fn flight(input: &egui::InputState, flying: bool) -> Vec3 {
-    let axis = |plus: Key, minus: Key| f32::from(input.key_down(plus)) - f32::from(input.key_down(minus));
-    let level = Vec3::new(axis(Key::D, Key::A), 0.0, axis(Key::W, Key::S));
+/// x to the right, y up, z forward. Keys with Ctrl are shortcuts, and E alone is one, unless the camera flies already;
+/// those in `not` are left out until they are let go.
+fn flight(input: &egui::InputState, flying: bool, not: &mut Vec<Key>) -> Vec3 {
+    not.retain(|key| input.key_down(*key));
     let looking = input.pointer.secondary_down();
     if input.modifiers.alt || input.modifiers.command && !(flying || looking) {
         return Vec3::ZERO;
     }
+    let down = |key: Key| f32::from(input.key_down(key) && !not.contains(&key));
+    let axis = |plus: Key, minus: Key| down(plus) - down(minus);
+    let level = Vec3::new(axis(Key::D, Key::A), 0.0, axis(Key::W, Key::S));
     let rises = flying || looking || level != Vec3::ZERO;
     level + if rises { axis(Key::E, Key::Q) * Vec3::Y } else { Vec3::ZERO }
 }

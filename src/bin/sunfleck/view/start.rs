@@ -17,7 +17,7 @@ const LEAST_CARD: f32 = 190.0;
 const MOST_CARD: f32 = 340.0;
 const GAP: f32 = 14.0;
 /// Of a card, for text.
-const TEXT: f32 = 64.0;
+const TEXT: f32 = 76.0;
 /// Seconds between two looks whether recent files are still there.
 const LOOK_EVERY: f64 = 2.0;
 

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
+use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::settings::Settings;
 
 /// Files that are remembered.
@@ -87,15 +88,23 @@ pub struct Remembered {
     pub show_settings: bool,
     pub show_inspect: bool,
     pub show_convergence: bool,
+    /// Name of the tone curve.
+    pub tone: String,
 }
 
 impl Default for Remembered {
     fn default() -> Self {
-        Self { recent: vec![], show_settings: true, show_inspect: true, show_convergence: false }
+        let tone = ToneMap::default().name().to_owned();
+        Self { recent: vec![], show_settings: true, show_inspect: true, show_convergence: false, tone }
     }
 }
 
 impl Remembered {
+    /// The tone curve of that name, else the usual one.
+    pub fn tone(&self) -> ToneMap {
+        ToneMap::from_name(&self.tone).unwrap_or_default()
+    }
+
     /// Puts a file first; names of shipped scenes are not remembered.
     pub fn opened(&mut self, name: &str) {
         let Ok(path) = Path::new(name).canonicalize() else { return };

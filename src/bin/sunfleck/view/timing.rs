@@ -15,7 +15,7 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// A frame took so long to make.
+    /// A frame took the interface thread so long, waits for the display left out.
     pub fn frame(&mut self, took: Duration) {
         push(&mut self.frames, took);
     }
@@ -30,6 +30,11 @@ impl Timing {
         if let Some((when, _)) = self.asked.take_if(|(_, before)| estimate > *before) {
             push(&mut self.waits, now - when);
         }
+    }
+
+    /// From inputs to their pictures, the newest.
+    pub fn waits(&self) -> impl Iterator<Item = Duration> {
+        self.waits.iter().copied()
     }
 
     /// For people.

@@ -18,6 +18,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
+use anyhow::{Context, Result};
 use glam::Vec3;
 use sunfleck::output::Picture;
 use sunfleck::output::display::Look;
@@ -239,7 +240,7 @@ impl Shared {
 }
 
 /// Does `work`; a panic in it becomes an error, one line.
-fn catch<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+pub fn catch<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     // What `work` may have left half done is thrown away by those who call this.
     catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
         let text = panic.downcast_ref::<&str>().map(ToString::to_string).or(panic.downcast_ref::<String>().cloned());
@@ -313,6 +314,16 @@ impl Engine {
     pub fn save(&self, save: Save) {
         self.shared.board().saves.push(save);
         self.shared.changed.notify_all();
+    }
+
+    /// Writes the newest film that was read back, and comes back when that is done: for the end.
+    pub fn save_at_once(&self, save: &Save) -> Result<u32> {
+        let (frame, device) = {
+            let board = self.shared.board();
+            (board.frame.clone(), board.device.clone())
+        };
+        let frame = frame.context("there is no picture yet")?;
+        worker::write(save, &frame, device)
     }
 
     /// Larger pictures are shown reduced, pixels a side.

@@ -11,7 +11,7 @@ use sunfleck::scene::settings::Settings;
 
 use super::session::{Frame, Session};
 use super::{Board, Choice, Message, Opened, Phase, Save, Shared, Wanted, catch};
-use crate::cli::{InputArgs, Usage};
+use crate::cli::InputArgs;
 use crate::devices::Device;
 use crate::job;
 use crate::scenes::Source;
@@ -268,10 +268,7 @@ fn resting(wanted: &Wanted) -> Phase {
 fn open(choice: &Arc<Choice>) -> Result<Opened> {
     let mut source = Source::resolve(&choice.name)?;
     let read = source.settings.clone();
-    for pair in &choice.set {
-        source.settings.set(pair).map_err(|e| Usage(format!("--set {pair}: {e}")))?;
-    }
-    source.locate();
+    source.set(&choice.set)?;
     let loaded = source.scene()?;
     Ok(Opened { choice: Arc::clone(choice), source, read, loaded })
 }
@@ -319,7 +316,7 @@ fn of_scene(settings: &Settings) -> Settings {
     }
 }
 
-fn write(save: &Save, frame: &Frame, adapter: String) -> Result<u32> {
+pub fn write(save: &Save, frame: &Frame, adapter: String) -> Result<u32> {
     let (film, params) = (&frame.film, &frame.params);
     let picture = frame.picture();
     if is_png(&save.path) {

@@ -32,8 +32,9 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
         return;
     };
     which(ui, viewer, read, &opened.loaded.scene);
-    place(ui, viewer, &camera);
-    lens(ui, viewer, &camera);
+    let file = file_of(viewer, read, &opened.loaded.scene);
+    place(ui, viewer, &camera, file.as_ref());
+    lens(ui, viewer, &camera, file.as_ref());
     ui.horizontal_wrapped(|ui| {
         let hint = "Moves the camera until the whole scene is in the picture (F). Restarts the estimate.";
         if ui.button("Frame all").on_hover_text(hint).clicked() {
@@ -69,6 +70,13 @@ fn chosen(scene: &Scene, index: usize) -> CameraSettings {
     }
 }
 
+/// Whether settings say no more than which camera of the scene: as the panel, or by number.
+fn is_chosen(scene: &Scene, index: usize, settings: &CameraSettings) -> bool {
+    let by_number = CameraSettings { name: Some(index.to_string()), ..CameraSettings::default() };
+    *settings == chosen(scene, index)
+        || *settings == by_number && scene.cameras.iter().all(|c| Some(&c.name) != settings.name.as_ref())
+}
+
 /// What to call it.
 fn title(camera: &Camera, index: usize) -> String {
     if camera.name.is_empty() { format!("camera {index}") } else { camera.name.clone() }
@@ -79,7 +87,7 @@ fn which(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene) {
     let is_the_files = now.camera == read.camera;
     let current = match &now.camera {
         None => Some(0),
-        Some(camera) => (0..scene.cameras.len()).find(|&i| chosen(scene, i) == *camera),
+        Some(camera) => (0..scene.cameras.len()).find(|&i| is_chosen(scene, i, camera)),
     };
     let text = match current {
         Some(i) => scene.cameras.get(i).map_or("framing the scene".to_owned(), |camera| title(camera, i)),
@@ -111,11 +119,61 @@ fn which(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene) {
     }
 }
 
-fn place(ui: &mut Ui, viewer: &mut Viewer, camera: &Camera) {
+/// What there is to go back to, field by field, of a camera that was moved.
+struct File {
+    /// The camera as the file has it.
+    camera: CameraSettings,
+    /// The same as the file says it.
+    read: Option<CameraSettings>,
+}
+
+fn file_of(viewer: &Viewer, read: &Settings, scene: &Scene) -> Option<File> {
+    let now = viewer.settings();
+    let moved = now.camera.as_ref().filter(|camera| Some(*camera) != read.camera.as_ref())?;
+    // One of the scene's is changed in nothing.
+    let is_whole = (0..scene.cameras.len()).any(|i| is_chosen(scene, i, moved));
+    let camera = read.camera_of(scene).ok().filter(|_| !is_whole)?;
+    Some(File { camera: (&camera).into(), read: read.camera.clone() })
+}
+
+/// A number of a camera's settings.
+type Field = fn(&mut CameraSettings) -> &mut Option<f32>;
+
+impl File {
+    fn differs(&self, now: &CameraSettings, field: Field) -> bool {
+        let [now, was] = [now, &self.camera].map(|settings| field(&mut settings.clone()).unwrap_or(0.0));
+        !is_near(now, was)
+    }
+}
+
+/// As near as degrees come back from radians.
+fn is_near(a: f32, b: f32) -> bool {
+    (a - b).abs() <= 1e-5 * b.abs()
+}
+
+/// Takes a field back; with the last one the camera is the file's again.
+fn reset_field(ui: &Ui, viewer: &mut Viewer, now: &Camera, file: &File, change: impl FnOnce(&mut CameraSettings)) {
+    let mut settings = CameraSettings::from(now);
+    change(&mut settings);
+    let lens = |s: &CameraSettings| {
+        [s.yfov_degrees, s.ymag, s.aperture_radius, s.focus_distance].map(Option::unwrap_or_default)
+    };
+    let same_lens = lens(&settings).into_iter().zip(lens(&file.camera)).all(|(a, b)| is_near(a, b));
+    let turned = |a: Option<[f32; 3]>, b: Option<[f32; 3]>| {
+        glam::Vec3::from(a.unwrap_or_default()).distance(b.unwrap_or_default().into()) > 1e-5
+    };
+    let is_turned = turned(settings.forward, file.camera.forward) || turned(settings.up, file.camera.up);
+    let is_files = settings.position == file.camera.position && same_lens && !is_turned;
+    let camera = if is_files { file.read.clone() } else { Some(settings) };
+    viewer.reset(ui, |s| s.camera = camera);
+}
+
+fn place(ui: &mut Ui, viewer: &mut Viewer, camera: &Camera, file: Option<&File>) {
     let mut settings = CameraSettings::from(camera);
     let mut position = settings.position.unwrap_or_default();
     let mut changed = false;
-    row(ui, POSITION, false, |ui| {
+    let was = file.and_then(|file| file.camera.position).filter(|was| *was != position);
+    let reset = row(ui, POSITION, was.is_some(), |ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         let each = egui::vec2(((ui.available_width() - 4.0) / 3.0).max(20.0), ui.spacing().interact_size.y);
         let speed = f64::from(camera.focus_distance.abs()).clamp(1e-3, 1e3) * 0.005;
@@ -132,23 +190,32 @@ fn place(ui: &mut Ui, viewer: &mut Viewer, camera: &Camera) {
         settings.position = Some(position);
         viewer.edit(ui, "camera", |s| s.camera = Some(settings));
     }
+    if let (true, Some(file)) = (reset, file) {
+        reset_field(ui, viewer, camera, file, |settings| settings.position = was);
+    }
 }
 
-fn lens(ui: &mut Ui, viewer: &mut Viewer, camera: &Camera) {
+fn lens(ui: &mut Ui, viewer: &mut Viewer, camera: &Camera, file: Option<&File>) {
     let time = ui.input(|i| i.time);
+    let now = CameraSettings::from(camera);
+    let differs = |field| file.is_some_and(|file| file.differs(&now, field));
+    let mut back;
     match camera.projection {
         Projection::Perspective { yfov } => {
             let mut degrees = f64::from(yfov.to_degrees());
-            row(ui, VIEW, false, |ui| {
+            let field: Field = |settings| &mut settings.yfov_degrees;
+            let reset = row(ui, VIEW, differs(field), |ui| {
                 let response = slider(ui, &mut degrees, 5.0..=140.0, |slider| slider.max_decimals(1).suffix("°"));
                 if response.changed() {
                     viewer.move_rig(time, &mut |rig| rig.set_yfov((degrees as f32).to_radians()));
                 }
                 response
             });
+            back = reset.then_some(field);
         }
         Projection::Orthographic { mut ymag } => {
-            row(ui, HEIGHT, false, |ui| {
+            let field: Field = |settings| &mut settings.ymag;
+            let reset = row(ui, HEIGHT, differs(field), |ui| {
                 let response = metres(ui, &mut ymag, 1e-6);
                 if response.changed() {
                     let settings = CameraSettings { ymag: Some(ymag), ..CameraSettings::from(camera) };
@@ -156,23 +223,32 @@ fn lens(ui: &mut Ui, viewer: &mut Viewer, camera: &Camera) {
                 }
                 response
             });
+            back = reset.then_some(field);
         }
     }
     let (mut aperture, mut focus) = (camera.aperture_radius, camera.focus_distance);
-    row(ui, APERTURE, false, |ui| {
+    let field: Field = |settings| &mut settings.aperture_radius;
+    let reset = row(ui, APERTURE, differs(field), |ui| {
         let response = metres(ui, &mut aperture, 0.0);
         if response.changed() {
             viewer.move_rig(time, &mut |rig| rig.set_aperture_radius(aperture));
         }
         response
     });
-    row(ui, FOCUS, false, |ui| {
+    back = back.or(reset.then_some(field));
+    let field: Field = |settings| &mut settings.focus_distance;
+    let reset = row(ui, FOCUS, differs(field), |ui| {
         let response = metres(ui, &mut focus, 1e-6);
         if response.changed() {
             viewer.move_rig(time, &mut |rig| rig.set_focus_distance(focus));
         }
         response
     });
+    back = back.or(reset.then_some(field));
+    if let (Some(field), Some(file)) = (back, file) {
+        let was = *field(&mut file.camera.clone());
+        reset_field(ui, viewer, camera, file, |settings| *field(settings) = was);
+    }
 }
 
 #[cfg(test)]

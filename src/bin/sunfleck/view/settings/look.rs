@@ -3,7 +3,7 @@
 use eframe::egui;
 use egui::{DragValue, Ui};
 use sunfleck::output::tonemap::ToneMap;
-use sunfleck::scene::settings::{Settings, Size};
+use sunfleck::scene::settings::{MAX_SIDE, Settings, Size};
 
 use super::widgets::{Name, choice, named, row, slider};
 use crate::view::app::Viewer;
@@ -30,8 +30,6 @@ const PRESETS: [([u32; 2], &str); 8] = [
     ([1024, 1024], "1024 × 1024"),
     ([2048, 1024], "2048 × 1024"),
 ];
-/// Width and height, at most; as settings allow.
-const MOST: u32 = 16_384;
 
 pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     size(ui, viewer, read);
@@ -64,7 +62,7 @@ fn size(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     let reset = row(ui, SIZE, now.size != read.size, |ui| {
         let each = egui::vec2(((ui.available_width() - 18.0) / 2.0).max(20.0), ui.spacing().interact_size.y);
         let [width, height] = &mut size;
-        let drag = |side| DragValue::new(side).range(1..=MOST).speed(2.0).update_while_editing(false);
+        let drag = |side| DragValue::new(side).range(1..=MAX_SIDE).speed(2.0).update_while_editing(false);
         let mut response = named(ui.add_sized(each, drag(width)), "Width");
         response |= ui.label("×");
         response |= named(ui.add_sized(each, drag(height)), "Height");
@@ -85,7 +83,7 @@ fn size(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
         let area = viewer.picture.area.map(|area| area.size() * ui.pixels_per_point());
         let hint = "As many pixels as there is room for in the window, now. Restarts the estimate.";
         if ui.add_enabled(area.is_some(), egui::Button::new("As large as the window")).on_hover_text(hint).clicked() {
-            chosen = area.map(|area| [area.x, area.y].map(|side| (side as u32).clamp(1, MOST)));
+            chosen = area.map(|area| [area.x, area.y].map(|side| (side as u32).clamp(1, MAX_SIDE)));
         }
     });
     if let Some(size) = chosen {

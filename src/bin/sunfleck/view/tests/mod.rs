@@ -3,6 +3,7 @@
 mod panels;
 mod shortcuts;
 mod snapshots;
+mod window;
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
@@ -47,6 +48,10 @@ struct Window {
     folder: TempDir,
 }
 
+fn engine() -> Engine {
+    Engine::start(Device::Cpu(sunfleck::scene::Accelerator::Bvh), Arc::new(|| {})).unwrap()
+}
+
 impl Window {
     fn new(scene: Option<&str>) -> Self {
         Self::with_renderer(scene, NoPixels)
@@ -61,8 +66,7 @@ impl Window {
             output: None,
             reference: None,
         };
-        let engine = Engine::start(Device::Cpu(sunfleck::scene::Accelerator::Bvh), Arc::new(|| {})).unwrap();
-        let mut viewer = Viewer::new(None, engine, Arc::new(|| {}), first);
+        let mut viewer = Viewer::new(engine(), Arc::new(|| {}), first);
         let asked = Arc::new(Mutex::new(vec![]));
         let (noted, place) = (Arc::clone(&asked), folder.path().to_owned());
         viewer.pick = Arc::new(move |purpose, _| {
@@ -76,7 +80,7 @@ impl Window {
             .allow_missing_glyphs()
             .with_accessibility_check(false)
             .renderer(renderer)
-            .build_ui_state(|ui, viewer: &mut Viewer| viewer.show(ui), viewer);
+            .build_ui_state(|ui, viewer: &mut Viewer| viewer.show(ui, None), viewer);
         Self { harness, commands: vec![], copied: vec![], asked, folder }
     }
 

@@ -1,13 +1,17 @@
 //! Panels, menus, messages, dropped files.
 
+use std::sync::Arc;
+
 use eframe::egui;
 use egui::{Event, Key, Modifiers, PointerButton, Role, ViewportCommand};
 use egui_kittest::kittest::{NodeT, Queryable};
 use sunfleck::output;
 use sunfleck::output::difference::Measure;
+use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::shipped::NAMES;
 
 use super::Window;
+use crate::view::app::{First, Viewer};
 use crate::view::engine::{Choice, Comparison, Phase, View};
 use crate::view::files::Purpose;
 use crate::view::keys::SHORTCUTS;
@@ -77,8 +81,10 @@ fn every_item_of_the_menus() {
     window.wait("picture", move |_| picture.exists());
     choose(&mut window, "File", "Copy render command");
     assert!(window.copied.iter().any(|text| text.starts_with("sunfleck render cornell --set ")), "{:?}", window.copied);
+    let before = window.viewer().opened().unwrap().clone();
     choose(&mut window, "File", "Read scene again");
     assert_eq!(window.viewer().wanted.reloads, 1);
+    window.wait("scene read again", move |viewer| viewer.opened().is_some_and(|now| !std::sync::Arc::ptr_eq(now, &before)));
     window.wait_for_picture();
     choose(&mut window, "File", "Screenshot");
     assert!(window.commands.iter().any(|command| matches!(command, ViewportCommand::Screenshot(_))));
@@ -200,6 +206,86 @@ fn letters_fly() {
     }
     window.press(Modifiers::COMMAND, Key::S);
     assert_eq!(window.viewer().edits.now().camera, before);
+    // All down at once, and Ctrl let go before the letter: still no more than a shortcut.
+    let command = Modifiers::COMMAND | Modifiers::CTRL;
+    for key in [Key::S, Key::A] {
+        let event = |pressed, modifiers| Event::Key { key, physical_key: None, pressed, repeat: false, modifiers };
+        let down = [Event::ModifiersChanged(command), event(true, command), Event::ModifiersChanged(Modifiers::NONE)];
+        window.harness.input_mut().events.extend(down);
+        window.steps(5);
+        assert_eq!(window.viewer().edits.now().camera, before, "{key:?}");
+        window.harness.input_mut().events.push(event(false, Modifiers::NONE));
+        window.step();
+        assert!(!window.viewer().picture.flying);
+    }
+    window.press(Modifiers::NONE, Key::A);
+    assert_ne!(window.viewer().edits.now().camera, before);
+}
+
+#[test]
+fn each_number_of_the_camera_has_a_way_back() {
+    let mut window = Window::with_picture();
+    let names = ["Reset position", "Reset field of view", "Reset aperture", "Reset focus"];
+    assert!(names.iter().all(|name| !window.shows(name)));
+    window.viewer().move_rig(0.0, &mut |rig| rig.pan(glam::vec2(0.1, 0.2)));
+    window.steps(2);
+    assert!(window.shows(names[0]) && names[1..].iter().all(|name| !window.shows(name)));
+    window.viewer().move_rig(0.0, &mut |rig| {
+        rig.set_yfov(1.0);
+        rig.set_aperture_radius(0.01);
+        rig.set_focus_distance(2.0);
+    });
+    window.steps(2);
+    for name in names {
+        assert!(window.viewer().edits.now().camera.is_some(), "{name}");
+        window.activate(name);
+        assert!(!window.shows(name), "{name}");
+    }
+    // Nothing is left that differs: the camera is the file's again.
+    assert_eq!(window.viewer().edits.now().camera, None);
+    window.press(Modifiers::COMMAND, Key::Z);
+    assert!(window.shows("Reset focus"));
+}
+
+#[test]
+fn a_reference_that_does_not_fit_is_told() {
+    let mut window = bare();
+    window.press(Modifiers::NONE, Key::C);
+    assert!(window.shows("nothing to compare with"));
+    let other = window.path("other.exr");
+    window.viewer().save_to(other.clone());
+    window.wait_for_message("saved ");
+    window.viewer().edit_at(0.0, "size", |settings| settings.set("size=16x12").unwrap());
+    window.wait("picture", |viewer| viewer.now.painted.as_ref().is_some_and(|painted| painted.size == [16, 12]));
+    window.drop_file(other);
+    window.wait_for_message("other.exr has 32×24 pixels, the picture 16×12");
+    window.press(Modifiers::NONE, Key::C);
+    assert_eq!(window.viewer().wanted.painting.comparison, Comparison::Off);
+}
+
+#[test]
+fn the_tone_curve_comes_back() {
+    #[derive(Default)]
+    struct Kept(std::collections::HashMap<String, String>);
+    impl eframe::Storage for Kept {
+        fn get_string(&self, key: &str) -> Option<String> {
+            self.0.get(key).cloned()
+        }
+        fn set_string(&mut self, key: &str, value: String) {
+            self.0.insert(key.to_owned(), value);
+        }
+        fn remove_string(&mut self, key: &str) {
+            self.0.remove(key);
+        }
+        fn flush(&mut self) {}
+    }
+    let mut window = Window::new(None);
+    window.viewer().wanted.painting.look.tonemap = ToneMap::Agx;
+    let mut kept = Kept::default();
+    window.viewer().save(&mut kept);
+    let mut viewer = Viewer::new(super::engine(), Arc::new(|| {}), First::default());
+    viewer.enter(Some(&kept));
+    assert_eq!(viewer.wanted.painting.look.tonemap, ToneMap::Agx);
 }
 
 /// Each control of the settings changes them, or how the picture is shown.

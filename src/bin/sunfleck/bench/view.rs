@@ -1,0 +1,147 @@
+//! `sunfleck bench view`: whether the window stays smooth while the heaviest of the shipped scenes renders behind it.
+//!
+//! A real window is opened, on the display there is, and closed again. It draws as often as the display lets it; the
+//! figures are of all its frames, first while the camera rests, then while the pointer turns it for 0.3 s in every 1.2 s.
+//! What a frame costs the interface thread leaves out where it waits for the display; the time from one frame to the
+//! next has all.
+
+use anyhow::Result;
+use clap::Args;
+use serde_json::json;
+
+use super::report::{self, Machine, Report, Row};
+use super::{Common, Where, backends};
+use crate::devices;
+use crate::view::measure::{self, Figures, Frames, Plan};
+
+const NOTES: &[&str] = &[
+    "interval: from one frame of the window to the next; work: of the interface thread, waits for the display left out",
+    "wait: from an input to the first frame that shows a picture of it, a preview or a whole one",
+];
+
+#[derive(Debug, Args)]
+pub struct ViewBenchArgs {
+    #[command(flatten)]
+    common: Common,
+
+    /// File, or name of a shipped scene
+    #[arg(long, value_name = "SCENE", default_value = "pool")]
+    scene: String,
+
+    /// Change a setting of the scene, as in `sunfleck view`
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+
+    /// Of each part, at rest and turning [default: 20]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    seconds: Option<f64>,
+
+    #[command(flatten)]
+    place: Where,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(s) if (0.1..=3600.0).contains(&s) => Ok(s),
+        Ok(_) => Err("must be from 0.1 to 3600".into()),
+        Err(_) => Err("not a number".into()),
+    }
+}
+
+pub fn run(args: &ViewBenchArgs) -> Result<()> {
+    let common = &args.common;
+    common.prepare("view", &[])?;
+    let backends = backends::names(&args.place.backend);
+    let seconds = args.seconds.unwrap_or(if common.quick { 3.0 } else { 20.0 });
+    let plan = Plan { scene: args.scene.clone(), set: args.set.clone(), seconds };
+    let mut steps = common.steps(backends.len());
+    let mut found = Vec::new();
+    for backend in &backends {
+        steps.next(&format!("{} on {backend}", plan.scene));
+        found.push((backend.as_str(), measure::run(devices::open_backend(backend)?, &plan)?));
+    }
+    let report = Report {
+        name: "view",
+        machine: Machine::here(found.iter().map(|(_, figures)| figures.renderer.clone()).collect()),
+        settings: json!({
+            "quick": common.quick, "scene": plan.scene, "set": plan.set, "seconds": seconds, "backends": backends,
+        }),
+        notes: NOTES,
+        rows: found.iter().flat_map(|(backend, figures)| rows(backend, figures)).collect(),
+    };
+    report.write(&common.output)?;
+    print(&report.machine, &plan, &found);
+    common.say_written(&report, &[]);
+    Ok(())
+}
+
+/// The two parts and what they are called.
+fn parts(figures: &Figures) -> [(&'static str, &Frames, &[f64]); 2] {
+    [("resting", &figures.resting, &[]), ("turning", &figures.turning, &figures.waits)]
+}
+
+/// Median, 95th percentile and most, milliseconds; none of nothing.
+fn percentiles(seconds: &[f64]) -> [Option<f64>; 3] {
+    let mut sorted = seconds.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    [0.5, 0.95, 1.0].map(|part: f64| {
+        let rank = (part * sorted.len() as f64).ceil() as usize;
+        sorted.get(rank.saturating_sub(1)).map(|s| (s * 1e6).round() / 1e3)
+    })
+}
+
+fn rows(backend: &str, figures: &Figures) -> Vec<Row> {
+    let of_part = |(part, frames, waits): (&str, &Frames, &[f64])| {
+        let mut row = Row::default()
+            .with("backend", backend)
+            .with("renderer", figures.renderer.as_str())
+            .with("window", figures.window.as_str())
+            .with("camera", part)
+            .with("frames", frames.intervals.len())
+            .with("iterations", frames.iterations);
+        for (name, times) in [("interval", frames.intervals.as_slice()), ("work", &frames.work), ("wait", waits)] {
+            for (suffix, ms) in ["Ms", "Ms95", "MsMost"].iter().zip(percentiles(times)) {
+                row = row.with(&format!("{name}{suffix}"), ms);
+            }
+        }
+        row.with("waits", waits.len())
+    };
+    parts(figures).map(of_part).into()
+}
+
+fn print(machine: &Machine, plan: &Plan, found: &[(&str, Figures)]) {
+    let header =
+        ["renderer", "camera", "frames", "iterations", "frame to frame", "interface thread", "input to picture"];
+    let cell = |times: &[f64]| match percentiles(times).map(|ms| ms.map(report::figure)) {
+        [Some(median), Some(most_of), Some(most)] => format!("{median} / {most_of} / {most}"),
+        _ => "–".into(),
+    };
+    let lines = found.iter().flat_map(|(backend, figures)| {
+        parts(figures).map(|(part, frames, waits)| {
+            let (n, iterations) = (frames.intervals.len().to_string(), frames.iterations.to_string());
+            let times = [&frames.intervals, &frames.work, waits].map(cell);
+            [(*backend).to_owned(), part.to_owned(), n, iterations].into_iter().chain(times).collect()
+        })
+    });
+    let windows: Vec<&str> = found.iter().map(|(_, figures)| figures.window.as_str()).collect();
+    let table = report::table(&header, 2, lines);
+    let drawn = windows.first().copied().unwrap_or_default();
+    crate::print(&format!(
+        "{}\nThe window, drawn by {drawn}, while {} renders; milliseconds: median / 95 % within / most\n{table}",
+        machine.line(),
+        plan.scene
+    ));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percentiles_are_ranks() {
+        let times: Vec<f64> = (1..=100).rev().map(|i| f64::from(i) / 1e3).collect();
+        assert_eq!(percentiles(&times), [Some(50.0), Some(95.0), Some(100.0)]);
+        assert_eq!(percentiles(&[]), [None; 3]);
+        assert_eq!(percentiles(&[0.002]), [Some(2.0); 3]);
+    }
+}

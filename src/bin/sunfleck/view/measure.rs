@@ -1,0 +1,198 @@
+//! The window under observation: how its frames keep up while a scene renders, and while its camera turns.
+
+use std::time::{Duration, Instant};
+
+use anyhow::{Result, bail};
+use eframe::egui;
+use egui::{Event, Modifiers, PointerButton, Pos2, vec2};
+
+use super::app::{First, Viewer};
+use super::engine::{Choice, Engine, Limits, Phase};
+use super::window::{self, Bell, Guest};
+use crate::devices::Device;
+
+/// Of the pointer, points a frame, and how long it moves and then rests, seconds.
+const SPEED: f32 = 4.0;
+const MOVES: f64 = 0.3;
+const RESTS: f64 = 0.9;
+/// For the first picture.
+const PATIENCE: Duration = Duration::from_secs(600);
+
+/// What is shown, and for how long.
+pub struct Plan {
+    /// File, or name of a shipped scene.
+    pub scene: String,
+    /// `key=value`, over its settings.
+    pub set: Vec<String>,
+    /// Of each part, seconds.
+    pub seconds: f64,
+}
+
+/// Frames of one part, in their order, seconds.
+#[derive(Clone, Debug, Default)]
+pub struct Frames {
+    /// From one to the next, waiting for the display included.
+    pub intervals: Vec<f64>,
+    /// Of the interface thread, without the waiting.
+    pub work: Vec<f64>,
+    /// Iterations that came to their end meanwhile.
+    pub iterations: u32,
+}
+
+/// What was found.
+#[derive(Clone, Debug, Default)]
+pub struct Figures {
+    /// What rendered, and what drew the window.
+    pub renderer: String,
+    pub window: String,
+    /// The camera rests.
+    pub resting: Frames,
+    /// It is turned by the pointer, again and again.
+    pub turning: Frames,
+    /// From an input to the first picture of it, seconds.
+    pub waits: Vec<f64>,
+}
+
+/// Opens a window that asks for frames as fast as the display takes them, and closes it by itself.
+pub fn run(device: Device, plan: &Plan) -> Result<Figures> {
+    let folder = tempfile::tempdir()?;
+    let options = || {
+        let mut options = window::options();
+        // Nothing of it is remembered.
+        options.persistence_path = Some(folder.path().join("window.ron"));
+        options
+    };
+    let choice = Choice { name: plan.scene.clone(), set: plan.set.clone() };
+    let first = First { choice: Some(choice), limits: Limits::default(), output: None, reference: None };
+    let bell = Bell::default();
+    let engine = Engine::start(device, bell.wake())?;
+    let mut viewer = Viewer::new(engine, bell.wake(), first);
+    let mut observer = Observer::new(plan.seconds);
+    window::run(&mut viewer, &bell, options, &mut observer)?;
+    if let Some(error) = observer.error {
+        bail!("{error}");
+    }
+    if !matches!(observer.part, Part::Done) {
+        bail!("the window was closed before its time");
+    }
+    observer.figures.waits = viewer.timing.waits().map(|wait| wait.as_secs_f64()).collect();
+    Ok(observer.figures)
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Part {
+    Opening,
+    Resting,
+    Turning,
+    Done,
+}
+
+struct Observer {
+    seconds: f64,
+    part: Part,
+    /// Of the part.
+    began: Instant,
+    last: Option<Instant>,
+    /// Where the pointer is, while it is pressed.
+    pressed: Option<Pos2>,
+    seen: (u64, u32),
+    figures: Figures,
+    error: Option<String>,
+}
+
+impl Observer {
+    fn new(seconds: f64) -> Self {
+        Self {
+            seconds,
+            part: Part::Opening,
+            began: Instant::now(),
+            last: None,
+            pressed: None,
+            seen: (0, 0),
+            figures: Figures::default(),
+            error: None,
+        }
+    }
+
+    fn enter(&mut self, part: Part) {
+        (self.part, self.began, self.last) = (part, Instant::now(), None);
+    }
+
+    /// Opening has no end of its own.
+    fn is_over(&self) -> bool {
+        self.began.elapsed().as_secs_f64() >= self.seconds
+    }
+
+    /// Adds a frame, which follows one that took `work`.
+    fn note(&mut self, viewer: &Viewer, work: Option<f32>) {
+        let frames = match self.part {
+            Part::Resting => &mut self.figures.resting,
+            Part::Turning => &mut self.figures.turning,
+            Part::Opening | Part::Done => return,
+        };
+        let now = Instant::now();
+        if let Some(last) = self.last.replace(now) {
+            frames.intervals.push((now - last).as_secs_f64());
+            frames.work.extend(work.map(f64::from));
+        }
+        if let Some(frame) = &viewer.now.frame {
+            let (estimate, n) = (frame.estimate, frame.film.n_iterations);
+            frames.iterations += if estimate == self.seen.0 { n.saturating_sub(self.seen.1) } else { n };
+            self.seen = (estimate, n);
+        }
+    }
+}
+
+impl Guest for Observer {
+    fn add_input(&mut self, viewer: &Viewer, input: &mut egui::RawInput) {
+        let Some(area) = viewer.picture.area.filter(|_| matches!(self.part, Part::Turning | Part::Done)) else {
+            return;
+        };
+        let time = self.began.elapsed().as_secs_f64() % (MOVES + RESTS);
+        let button = |pos, pressed| Event::PointerButton {
+            pos,
+            button: PointerButton::Primary,
+            pressed,
+            modifiers: Modifiers::NONE,
+        };
+        match self.pressed {
+            Some(pos) if time >= MOVES || matches!(self.part, Part::Done) => {
+                input.events.push(button(pos, false));
+                self.pressed = None;
+            }
+            Some(pos) => {
+                let pos = pos + vec2(SPEED, 0.0);
+                input.events.push(Event::PointerMoved(pos));
+                self.pressed = Some(pos);
+            }
+            None if time < MOVES => {
+                let pos = area.center() - vec2(0.2 * area.width(), 0.0);
+                input.events.extend([Event::PointerMoved(pos), button(pos, true)]);
+                self.pressed = Some(pos);
+            }
+            None => {}
+        }
+    }
+
+    fn after_frame(&mut self, viewer: &Viewer, ui: &egui::Ui, frame: &eframe::Frame) {
+        self.note(viewer, frame.info().cpu_usage);
+        match (&viewer.now.phase, self.part) {
+            (Phase::Failed(error), _) => self.error = Some(error.clone()),
+            (_, Part::Opening) if viewer.now.painted.is_some() => {
+                self.figures.renderer.clone_from(&viewer.now.device);
+                if let Some(state) = frame.wgpu_render_state() {
+                    self.figures.window = state.adapter.get_info().name;
+                }
+                self.enter(Part::Resting);
+            }
+            (_, Part::Opening) if self.began.elapsed() > PATIENCE => self.error = Some("no picture appears".into()),
+            (_, Part::Resting) if self.is_over() => self.enter(Part::Turning),
+            (_, Part::Turning) if self.is_over() => self.enter(Part::Done),
+            _ => {}
+        }
+        if self.error.is_some() || matches!(self.part, Part::Done) {
+            ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
+        }
+        ui.ctx().request_repaint();
+    }
+}

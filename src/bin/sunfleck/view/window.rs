@@ -1,0 +1,196 @@
+//! The window of the system, and what may befall it.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::{panic, thread};
+
+use anyhow::{Result, anyhow};
+use eframe::egui;
+
+use super::app::Viewer;
+use super::engine::{Message, Wake, catch};
+
+/// Where eframe keeps what is remembered, and what the window manager knows the window by.
+const APP_ID: &str = "sunfleck";
+/// A device that fails before it has drawn so many is not opened again.
+pub const FEWEST_FRAMES: usize = 10;
+
+/// The window that there is, for threads that have news for it.
+#[derive(Clone, Default)]
+pub struct Bell(Arc<Mutex<Option<egui::Context>>>);
+
+impl Bell {
+    fn hang(&self, context: &egui::Context) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(context.clone());
+    }
+
+    /// Asks for another frame, from any thread.
+    pub fn wake(&self) -> Wake {
+        let bell = self.clone();
+        Arc::new(move || {
+            // Not while the lock is held: the window may be asking for it.
+            let context = bell.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            if let Some(context) = context {
+                context.request_repaint();
+            }
+        })
+    }
+}
+
+/// What went wrong with the device that draws the window; nothing while it works.
+#[derive(Clone, Default)]
+struct Fault(Arc<Mutex<Option<String>>>);
+
+impl Fault {
+    /// The first is told; others follow from it.
+    fn set(&self, text: String) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(text);
+    }
+
+    fn get(&self) -> Option<String> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+/// Who has a hand in the window beside its user: a benchmark, a test.
+pub trait Guest {
+    /// Before every frame: what else was typed and pointed at.
+    fn add_input(&mut self, _: &Viewer, _: &mut egui::RawInput) {}
+
+    /// After every frame, before it is drawn.
+    fn after_frame(&mut self, _: &Viewer, _: &egui::Ui, _: &eframe::Frame) {}
+}
+
+/// Nobody.
+impl Guest for () {}
+
+/// How the window is at first.
+pub fn options() -> eframe::NativeOptions {
+    eframe::NativeOptions {
+        viewport: egui::ViewportBuilder::default()
+            .with_app_id(APP_ID)
+            .with_title("Sunfleck")
+            .with_inner_size([1280.0, 720.0])
+            .with_min_inner_size([480.0, 320.0])
+            .with_drag_and_drop(true),
+        renderer: eframe::Renderer::Wgpu,
+        ..Default::default()
+    }
+}
+
+/// Shows `viewer` until its window is closed. When the window loses its device, another is opened, and what renders goes
+/// on; when there can be none any more, the picture is written to a file first.
+pub fn run(
+    viewer: &mut Viewer,
+    bell: &Bell,
+    options: impl Fn() -> eframe::NativeOptions,
+    guest: &mut impl Guest,
+) -> Result<()> {
+    loop {
+        let (fault, mut n_frames) = (Fault::default(), 0);
+        let shown = (&mut *viewer, &mut *guest, &mut n_frames);
+        let ended = quietly(|| {
+            eframe::run_native(
+                APP_ID,
+                options(),
+                Box::new(|creation| {
+                    let (viewer, guest, n_frames) = shown;
+                    bell.hang(&creation.egui_ctx);
+                    watch(creation, &fault);
+                    viewer.enter(creation.storage);
+                    Ok(Box::new(Window { viewer, guest, n_frames, fault: fault.clone() }))
+                }),
+            )
+        });
+        let why = match (ended, fault.get()) {
+            (Ok(Ok(())), None) => return Ok(()),
+            (Ok(Ok(())), Some(fault)) if n_frames >= FEWEST_FRAMES => {
+                let text = format!("the window's graphics device failed ({fault}); it was opened again");
+                eprintln!("sunfleck: warning: {text}");
+                viewer.tell(Message::Warning(text));
+                continue;
+            }
+            (_, Some(fault)) => anyhow!("the window's graphics device failed: {fault}"),
+            (Ok(Err(error)), None) => anyhow!("no window: {}", without_source(&error.to_string())),
+            (Err(panic), None) => anyhow!("the window is gone: {panic}"),
+        };
+        return Err(match rescue(viewer) {
+            Some(path) => why.context(format!("saved the picture as {}", path.display())),
+            None => why,
+        });
+    }
+}
+
+/// What winit says, without the line of its source that it says first.
+fn without_source(text: &str) -> &str {
+    let words = text.rsplit_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")).map_or(text, |(_, words)| words);
+    words.trim_end_matches('.')
+}
+
+/// A panic of the window's libraries is an error, told in one line: winit panics when the display goes away, egui-wgpu when
+/// the device is lost in the middle of a frame. There can be no other window after one.
+fn quietly<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    if std::env::var_os("RUST_BACKTRACE").is_some_and(|value| value != "0") {
+        return catch(work);
+    }
+    let (here, usual) = (thread::current().id(), Arc::new(panic::take_hook()));
+    let elsewhere = Arc::clone(&usual);
+    panic::set_hook(Box::new(move |info| {
+        if thread::current().id() != here {
+            elsewhere(info);
+        }
+    }));
+    let done = catch(work);
+    panic::set_hook(Box::new(move |info| usual(info)));
+    done
+}
+
+/// Notes what the window's device reports: without this wgpu panics.
+fn watch(creation: &eframe::CreationContext<'_>, fault: &Fault) {
+    let Some(state) = &creation.wgpu_render_state else { return };
+    let (lost, context) = (fault.clone(), creation.egui_ctx.clone());
+    state.device.set_device_lost_callback(move |_, text| {
+        lost.set(if text.is_empty() { "lost".to_owned() } else { crate::one_line(&text) });
+        context.request_repaint();
+    });
+    let (wrong, context) = (fault.clone(), creation.egui_ctx.clone());
+    state.device.on_uncaptured_error(Arc::new(move |error: eframe::wgpu::Error| {
+        wrong.set(crate::one_line(&error.to_string()));
+        context.request_repaint();
+    }));
+}
+
+/// Writes the newest film where the user wanted pictures, or wherever it can be written; where that is.
+fn rescue(viewer: &Viewer) -> Option<PathBuf> {
+    let name = format!("sunfleck-{}.exr", std::process::id());
+    let places = [viewer.output.clone(), Some(PathBuf::from(&name)), Some(std::env::temp_dir().join(&name))];
+    places.into_iter().flatten().find(|path| viewer.engine().save_at_once(&viewer.saving_to(path.clone())).is_ok())
+}
+
+struct Window<'a, G> {
+    viewer: &'a mut Viewer,
+    guest: &'a mut G,
+    n_frames: &'a mut usize,
+    fault: Fault,
+}
+
+impl<G: Guest> eframe::App for Window<'_, G> {
+    fn raw_input_hook(&mut self, _: &egui::Context, input: &mut egui::RawInput) {
+        self.guest.add_input(self.viewer, input);
+    }
+
+    fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
+        if self.fault.get().is_some() {
+            // Nothing can be drawn here; `run` sees to it.
+            ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
+            return;
+        }
+        self.viewer.show(ui, frame.info().cpu_usage);
+        *self.n_frames += 1;
+        self.guest.after_frame(self.viewer, ui, frame);
+    }
+
+    fn save(&mut self, storage: &mut dyn eframe::Storage) {
+        self.viewer.save(storage);
+    }
+}
