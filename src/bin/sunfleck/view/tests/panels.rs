@@ -84,7 +84,9 @@ fn every_item_of_the_menus() {
     let before = window.viewer().opened().unwrap().clone();
     choose(&mut window, "File", "Read scene again");
     assert_eq!(window.viewer().wanted.reloads, 1);
-    window.wait("scene read again", move |viewer| viewer.opened().is_some_and(|now| !std::sync::Arc::ptr_eq(now, &before)));
+    window.wait("scene read again", move |viewer| {
+        viewer.opened().is_some_and(|now| !std::sync::Arc::ptr_eq(now, &before))
+    });
     window.wait_for_picture();
     choose(&mut window, "File", "Screenshot");
     assert!(window.commands.iter().any(|command| matches!(command, ViewportCommand::Screenshot(_))));
