@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use ::sunfleck::index::kd::{self, Builder, Hit, KdOptions, KdTree, LazyKd, Ray, RaySearch, Scalar, Triangles};
-use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{Element, IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -83,14 +83,12 @@ fn refused(error: String) -> PyErr {
     PyValueError::new_err(error)
 }
 
-macro_rules! rays {
-    ($origins:ident, $directions:ident, $min:ident, $max:ident) => {
-        Rays {
-            origins: triples(&$origins)?,
-            directions: triples(&$directions)?,
-            ranges: [$min.as_slice()?, $max.as_slice()?],
-        }
-    };
+/// Origins and directions, `[n, 3]`, and first and last t, `[n]`.
+type Arrays<'py, T> = (PyReadonlyArray2<'py, T>, PyReadonlyArray2<'py, T>, PyReadonlyArray1<'py, T>, PyReadonlyArray1<'py, T>);
+
+fn rays<'a, T: Element>((origins, directions, min, max): &'a Arrays<'_, T>) -> PyResult<Rays<'a, T>> {
+    let ranges = [min.as_slice()?, max.as_slice()?];
+    Ok(Rays { origins: triples(origins)?, directions: triples(directions)?, ranges })
 }
 
 macro_rules! class {
@@ -133,12 +131,9 @@ macro_rules! class {
             fn any<'py>(
                 &self,
                 py: Python<'py>,
-                origins: PyReadonlyArray2<'py, $scalar>,
-                directions: PyReadonlyArray2<'py, $scalar>,
-                min: PyReadonlyArray1<'py, $scalar>,
-                max: PyReadonlyArray1<'py, $scalar>,
+                of: Arrays<'py, $scalar>,
             ) -> PyResult<Array<'py, bool>> {
-                let rays = rays!(origins, directions, min, max);
+                let rays = rays(&of)?;
                 let found = py.detach(|| rays.ask(|ray| self.0.any(ray))).map_err(refused)?;
                 Ok(found.into_pyarray(py))
             }
@@ -147,12 +142,9 @@ macro_rules! class {
             fn count<'py>(
                 &self,
                 py: Python<'py>,
-                origins: PyReadonlyArray2<'py, $scalar>,
-                directions: PyReadonlyArray2<'py, $scalar>,
-                min: PyReadonlyArray1<'py, $scalar>,
-                max: PyReadonlyArray1<'py, $scalar>,
+                of: Arrays<'py, $scalar>,
             ) -> PyResult<Array<'py, u32>> {
-                let rays = rays!(origins, directions, min, max);
+                let rays = rays(&of)?;
                 let found = py.detach(|| rays.ask(|ray| self.0.count(ray) as u32)).map_err(refused)?;
                 Ok(found.into_pyarray(py))
             }
@@ -161,12 +153,9 @@ macro_rules! class {
             fn nearest<'py>(
                 &self,
                 py: Python<'py>,
-                origins: PyReadonlyArray2<'py, $scalar>,
-                directions: PyReadonlyArray2<'py, $scalar>,
-                min: PyReadonlyArray1<'py, $scalar>,
-                max: PyReadonlyArray1<'py, $scalar>,
+                of: Arrays<'py, $scalar>,
             ) -> PyResult<(Array<'py, $scalar>, Array<'py, u32>, Array<'py, $scalar>)> {
-                let rays = rays!(origins, directions, min, max);
+                let rays = rays(&of)?;
                 let none = self.0.triangles().len() as u32;
                 let (t, face, weights) = py
                     .detach(|| {
@@ -184,12 +173,9 @@ macro_rules! class {
             fn all<'py>(
                 &self,
                 py: Python<'py>,
-                origins: PyReadonlyArray2<'py, $scalar>,
-                directions: PyReadonlyArray2<'py, $scalar>,
-                min: PyReadonlyArray1<'py, $scalar>,
-                max: PyReadonlyArray1<'py, $scalar>,
+                of: Arrays<'py, $scalar>,
             ) -> PyResult<(Array<'py, usize>, Array<'py, $scalar>, Array<'py, u32>, Array<'py, $scalar>)> {
-                let rays = rays!(origins, directions, min, max);
+                let rays = rays(&of)?;
                 let (offsets, t, faces, weights) = py
                     .detach(|| {
                         let rows = rays.ask(|ray| {

@@ -41,6 +41,7 @@ pub fn mesh_check<'py>(
         pinched_vertices,
         clashing_edges,
         intersections,
+        touching,
         shells,
         one_sided,
         verdict,
@@ -74,6 +75,7 @@ pub fn mesh_check<'py>(
         ("crowded_edges", crowded_edges),
         ("clashing_edges", clashing_edges),
         ("intersections", intersections),
+        ("touching", touching),
     ] {
         found.set_item(name, pairs.into_flattened().into_pyarray(py))?;
     }

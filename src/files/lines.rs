@@ -10,6 +10,7 @@ const MAX_LINES: u64 = i32::MAX as u64;
 const MAX_LINE: u64 = 1 << 16;
 /// U+FEFF in UTF-8.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
 /// Calls `each` with the beginning of every line, as many bytes as `wanted` says; an error gets the line's number.
 ///
 /// The rest is left out: it need not be text, nor end within [`MAX_LINE`].
@@ -42,7 +43,12 @@ pub fn lines(
             input.skip_until(b'\n').map_err(|e| fail(plain(&e)))?;
         }
         let text = std::str::from_utf8(wanted).map_err(|_| fail("not text".into()))?;
-        each(text.trim_end_matches(['\n', '\r'])).map_err(fail)?;
+        let text = text.trim_end_matches(['\n', '\r']);
+        // They would be one line, and most of it passed over.
+        if text.contains('\r') {
+            return Err(fail("lines end with carriage returns alone: line feeds are expected".into()));
+        }
+        each(text).map_err(fail)?;
     }
     Ok(())
 }

@@ -5,16 +5,18 @@ use std::collections::HashMap;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::crossings::{are_collinear, intersect};
+use super::crossings::{Contact, are_collinear, contact};
 use super::orientation::{Facing, by_rays};
-use super::overlaps::Overlaps;
+use super::overlaps::{Limits, Overlaps, Pair, TooMany};
 use super::report::{Doubt, Report, Shell, Verdict};
 use super::topology::Topology;
 use super::{Error, Mesh, corners_of_box, largest};
 use crate::index::kd::{KdOptions, KdTree, LazyKd, Sah, Triangles};
 
-/// Pairs of intersecting faces that are listed, at most.
+/// Pairs of faces that intersect or touch and are listed, at most.
 const MAX_PAIRS: usize = 1 << 24;
+/// Pairs of faces near each other that are tested, at most: more take a quarter of an hour or so.
+const MAX_TESTS: usize = 1 << 33;
 
 /// How a mesh is checked. The report does not depend on it, but for what is left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,7 +25,7 @@ pub struct CheckOptions {
     pub kd: KdOptions,
     /// Whether the tree is built where rays come, not before.
     pub lazy: bool,
-    /// Whether to look for faces that intersect. If not, the verdict takes it that there are none.
+    /// Whether to look for faces that intersect or touch. If not, the verdict takes it that there are none.
     pub intersections: bool,
 }
 
@@ -48,22 +50,25 @@ pub fn check(mesh: &Mesh, options: &CheckOptions) -> Result<Report, Error> {
     let degenerate: Vec<bool> = solid.per_face(parallel, |face| are_collinear(solid.corners(face)));
     let has_edges = |face: usize| has_three(solid.faces[face]);
     let topology = Topology::new(&solid.faces, has_edges, solid.vertices.len(), parallel);
-    let intersections = match options.intersections {
-        true => solid.intersections(&degenerate, parallel)?,
+    let duplicates = solid.duplicates();
+    let contacts = match options.intersections {
+        true => solid.contacts(&degenerate, &duplicates, parallel)?,
         false => Vec::new(),
     };
+    let of_kind = |wanted| contacts.iter().filter(|(_, kind)| *kind == wanted).map(|(pair, _)| *pair).collect();
     let mut report = Report {
         vertices: mesh.vertices.len(),
         faces: mesh.faces.len(),
         merged_vertices: solid.n_merged,
         unused_vertices: solid.n_unused,
         degenerate: (0..).zip(&degenerate).filter(|(_, is)| **is).map(|(face, _)| face).collect(),
-        duplicates: solid.duplicates(),
+        duplicates,
         open_edges: topology.open,
         crowded_edges: topology.crowded,
         pinched_vertices: topology.pinched,
         clashing_edges: topology.clashing,
-        intersections,
+        intersections: of_kind(Contact::Cross),
+        touching: of_kind(Contact::Touch),
         shells: Vec::new(),
         one_sided: topology.one_sided,
         verdict: Verdict::Outward,
@@ -81,7 +86,7 @@ pub fn check(mesh: &Mesh, options: &CheckOptions) -> Result<Report, Error> {
     } else if !report.one_sided.is_empty() {
         Some(Doubt::OneSided)
     } else {
-        let facings = solid.facings(options)?;
+        let facings = solid.facings(&report.duplicates, options)?;
         report.disputed = shells.vote(&facings);
         if !report.disputed.is_empty() {
             Some(Doubt::Disputed)
@@ -168,32 +173,75 @@ impl Merged {
         duplicates
     }
 
-    fn intersections(&self, degenerate: &[bool], parallel: bool) -> Result<Vec<[u32; 2]>, Error> {
+    /// Pairs of faces that intersect or touch, in rising order.
+    fn contacts(
+        &self,
+        degenerate: &[bool],
+        duplicates: &[[u32; 2]],
+        parallel: bool,
+    ) -> Result<Vec<Pair<Contact>>, Error> {
         let boxes = self.per_face(parallel, |face| {
             let [a, b, c] = self.corners(face);
             [0, 1].map(|end| {
                 std::array::from_fn(|i| if end == 0 { a[i].min(b[i]).min(c[i]) } else { a[i].max(b[i]).max(c[i]) })
             })
         });
-        let faces = (0..self.faces.len() as u32).filter(|&face| !degenerate[face as usize]).collect();
-        let is_wanted = |a: u32, b: u32| {
+        // Of duplicates the first stands for all: they would be so many pairs of boxes that have nothing to tell.
+        let mut is_part: Vec<bool> = degenerate.iter().map(|is| !is).collect();
+        duplicates.iter().for_each(|&[again, _]| is_part[again as usize] = false);
+        let faces = (0..self.faces.len() as u32).filter(|&face| is_part[face as usize]).collect();
+        let kind = |a: u32, b: u32| {
             let (a, b) = (a as usize, b as usize);
-            intersect(self.corners(a), self.faces[a], self.corners(b), self.faces[b])
+            contact(self.corners(a), self.faces[a], self.corners(b), self.faces[b])
         };
-        Overlaps::new(&boxes, faces, parallel).pairs(is_wanted, MAX_PAIRS).ok_or(Error::Tangled(MAX_PAIRS))
+        let limits = Limits { found: MAX_PAIRS, asked: MAX_TESTS };
+        let contacts =
+            Overlaps::new(&boxes, faces, parallel).pairs(kind, limits).map_err(|too_many| match too_many {
+                TooMany::Found => Error::Tangled(MAX_PAIRS),
+                TooMany::Asked => Error::Crowded(MAX_TESTS),
+            })?;
+        if duplicates.is_empty() {
+            return Ok(contacts);
+        }
+        let mut copies: HashMap<u32, Vec<u32>> = HashMap::new();
+        duplicates.iter().for_each(|&[again, first]| copies.entry(first).or_insert(vec![first]).push(again));
+        let all = |face: &u32| copies.get(face).cloned().unwrap_or(vec![*face]);
+        let mut every = Vec::new();
+        for ([a, b], kind) in contacts {
+            let (a, b) = (all(&a), all(&b));
+            if every.len() + a.len() * b.len() > MAX_PAIRS {
+                return Err(Error::Tangled(MAX_PAIRS));
+            }
+            every.extend(a.iter().flat_map(|&a| b.iter().map(move |&b| ([a.min(b), a.max(b)], kind))));
+        }
+        every.sort_unstable();
+        Ok(every)
     }
 
     /// By rays, in a frame around the origin: there rays begin where they should.
-    fn facings(&self, options: &CheckOptions) -> Result<Vec<Facing>, Error> {
+    ///
+    /// No ray decides on a face that has a copy. Through others, two copies are as good as none.
+    fn facings(&self, duplicates: &[[u32; 2]], options: &CheckOptions) -> Result<Vec<Facing>, Error> {
         let [min, max] = corners_of_box(self.faces.iter().flatten().map(|&v| self.vertices[v as usize]));
         let centre = 0.5 * (min + max);
         let vertices = self.vertices.iter().map(|&p| (DVec3::from(p) - centre).to_array()).collect();
-        let triangles = Triangles::new(vertices, self.faces.clone())?;
+        let mut n_copies = vec![1u32; self.faces.len()];
+        for &[again, first] in duplicates {
+            n_copies[first as usize] += 1;
+            n_copies[again as usize] = 0;
+        }
+        let odd: Vec<usize> = (0..self.faces.len()).filter(|&face| n_copies[face] % 2 == 1).collect();
+        let triangles = Triangles::new(vertices, odd.iter().map(|&face| self.faces[face]).collect())?;
         let parallel = options.kd.parallel;
-        Ok(match options.lazy {
+        let of_odd = match options.lazy {
             true => by_rays(&LazyKd::new(triangles, &options.kd)?, parallel),
             false => by_rays(&KdTree::new(triangles, &options.kd)?, parallel),
-        })
+        };
+        let mut facings = vec![Facing::Undecided; self.faces.len()];
+        for (&face, facing) in odd.iter().zip(of_odd).filter(|(face, _)| n_copies[**face] == 1) {
+            facings[face] = facing;
+        }
+        Ok(facings)
     }
 }
 

@@ -58,8 +58,11 @@ pub enum Error {
         problem: String,
     },
     /// So many pairs that listing them helps nobody.
-    #[error("more than {0} pairs of faces intersect: this is not a surface")]
+    #[error("more than {0} pairs of faces intersect or touch: this is not a surface")]
     Tangled(usize),
+    /// So many pairs that looking at them would take too long. Without [`CheckOptions::intersections`] there is a report.
+    #[error("the boxes of more than {0} pairs of faces overlap: too many to be tested")]
+    Crowded(usize),
 }
 
 impl Mesh {

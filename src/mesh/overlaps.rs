@@ -33,11 +33,39 @@ pub struct Overlaps<'a> {
     parallel: bool,
 }
 
+/// Two boxes, the lower index first, and what is known of them.
+pub type Pair<K> = ([u32; 2], K);
+
+/// Too many pairs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TooMany {
+    /// Of those that are wanted.
+    Found,
+    /// Of those that had to be asked about.
+    Asked,
+}
+
 /// What was found, and how much may be.
 struct Found<'a, F> {
-    is_wanted: &'a F,
+    kind: &'a F,
     n: AtomicUsize,
-    limit: usize,
+    n_asked: AtomicUsize,
+    limits: Limits,
+}
+
+/// How many pairs there may be.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Of those that are wanted.
+    pub found: usize,
+    /// Of boxes in neighbouring leaves, which is what takes the time.
+    pub asked: usize,
+}
+
+impl<F> Found<'_, F> {
+    fn is_too_much(&self) -> bool {
+        self.n.load(Ordering::Relaxed) > self.limits.found || self.n_asked.load(Ordering::Relaxed) > self.limits.asked
+    }
 }
 
 impl<'a> Overlaps<'a> {
@@ -50,23 +78,37 @@ impl<'a> Overlaps<'a> {
         Self { boxes, order, nodes, parallel }
     }
 
-    /// Every two overlapping boxes for which `is_wanted`, the lower index first, in rising order; none if there are more
-    /// than `limit`.
-    pub fn pairs(&self, is_wanted: impl Fn(u32, u32) -> bool + Sync, limit: usize) -> Option<Vec<[u32; 2]>> {
-        let found = Found { is_wanted: &is_wanted, n: AtomicUsize::new(0), limit };
+    /// Every two overlapping boxes of which `kind` knows one, in rising order.
+    pub fn pairs<K: Ord + Send>(
+        &self,
+        kind: impl Fn(u32, u32) -> Option<K> + Sync,
+        limits: Limits,
+    ) -> Result<Vec<Pair<K>>, TooMany> {
+        let found = Found { kind: &kind, n: AtomicUsize::new(0), n_asked: AtomicUsize::new(0), limits };
         let mut pairs = Vec::new();
         if !self.nodes.is_empty() {
             self.within(0, &found, &mut pairs);
         }
         pairs.sort_unstable();
-        (found.n.into_inner() <= limit).then_some(pairs)
+        if found.n.into_inner() > limits.found {
+            Err(TooMany::Found)
+        } else if found.n_asked.into_inner() > limits.asked {
+            Err(TooMany::Asked)
+        } else {
+            Ok(pairs)
+        }
     }
 
     fn boxes(&self, node: &Node) -> &[u32] {
         &self.order[node.begin as usize..node.end as usize]
     }
 
-    fn within<F: Fn(u32, u32) -> bool + Sync>(&self, at: usize, found: &Found<F>, pairs: &mut Vec<[u32; 2]>) {
+    fn within<K: Send, F: Fn(u32, u32) -> Option<K> + Sync>(
+        &self,
+        at: usize,
+        found: &Found<F>,
+        pairs: &mut Vec<Pair<K>>,
+    ) {
         let node = &self.nodes[at];
         if node.second == 0 {
             let boxes = self.boxes(node);
@@ -96,12 +138,13 @@ impl<'a> Overlaps<'a> {
         }
     }
 
-    fn between<F: Fn(u32, u32) -> bool>(&self, a: usize, b: usize, found: &Found<F>, pairs: &mut Vec<[u32; 2]>) {
+    fn between<K, F: Fn(u32, u32) -> Option<K>>(&self, a: usize, b: usize, found: &Found<F>, pairs: &mut Vec<Pair<K>>) {
         let (node, other) = (&self.nodes[a], &self.nodes[b]);
-        if !overlap(&node.bounds, &other.bounds) || found.n.load(Ordering::Relaxed) > found.limit {
+        if !overlap(&node.bounds, &other.bounds) || found.is_too_much() {
             return;
         }
         if node.second == 0 && other.second == 0 {
+            found.n_asked.fetch_add(node.len() * other.len(), Ordering::Relaxed);
             for &i in self.boxes(node) {
                 self.boxes(other).iter().for_each(|&j| self.test(i, j, found, pairs));
             }
@@ -114,13 +157,13 @@ impl<'a> Overlaps<'a> {
         }
     }
 
-    fn test<F: Fn(u32, u32) -> bool>(&self, a: u32, b: u32, found: &Found<F>, pairs: &mut Vec<[u32; 2]>) {
+    fn test<K, F: Fn(u32, u32) -> Option<K>>(&self, a: u32, b: u32, found: &Found<F>, pairs: &mut Vec<Pair<K>>) {
         let (a, b) = (a.min(b), a.max(b));
         if overlap(&self.boxes[a as usize], &self.boxes[b as usize])
-            && (found.is_wanted)(a, b)
-            && found.n.fetch_add(1, Ordering::Relaxed) < found.limit
+            && let Some(kind) = (found.kind)(a, b)
+            && found.n.fetch_add(1, Ordering::Relaxed) < found.limits.found
         {
-            pairs.push([a, b]);
+            pairs.push(([a, b], kind));
         }
     }
 }
@@ -149,4 +192,53 @@ fn join(a: Aabb, b: Aabb) -> Aabb {
 
 fn overlap(a: &Aabb, b: &Aabb) -> bool {
     (0..3).all(|axis| a[0][axis] <= b[1][axis] && b[0][axis] <= a[1][axis])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::rng::pcg4d;
+
+    #[test]
+    fn pairs_are_those_of_testing_all_and_limits_hold() {
+        let edge = |word: u32, size: u32| f64::from(word % size);
+        let boxes: Vec<Aabb> = (0..3000)
+            .map(|i| {
+                let (at, size) = (pcg4d([i, 0, 5, 7]), pcg4d([i, 1, 5, 7]));
+                let min = [0, 1, 2].map(|axis| edge(at[axis], 60));
+                // Some without size; many that only touch.
+                [min, [0, 1, 2].map(|axis| min[axis] + edge(size[axis], 4))]
+            })
+            .collect();
+        // Not all, and not in order.
+        let some: Vec<u32> = (0..3000).rev().filter(|i| i % 7 != 0).collect();
+        let mut expected = Vec::new();
+        for &a in some.iter().rev() {
+            expected.extend(
+                some.iter()
+                    .rev()
+                    .filter(|&&b| b > a && overlap(&boxes[a as usize], &boxes[b as usize]))
+                    .map(|&b| ([a, b], ())),
+            );
+        }
+        assert!(expected.len() > 500, "{}", expected.len());
+        for parallel in [false, true] {
+            let overlaps = Overlaps::new(&boxes, some.clone(), parallel);
+            let pairs = |found, asked| overlaps.pairs(|_, _| Some(()), Limits { found, asked });
+            assert_eq!(pairs(expected.len(), usize::MAX), Ok(expected.clone()));
+            assert_eq!(pairs(expected.len() - 1, usize::MAX), Err(TooMany::Found));
+            assert_eq!(pairs(usize::MAX, expected.len() / 2), Err(TooMany::Asked));
+            let odd =
+                overlaps.pairs(|a, b| ((a + b) % 2 == 1).then_some(b), Limits { found: usize::MAX, asked: usize::MAX });
+            let is_odd = |([a, b], ()): &&Pair<()>| (a + b) % 2 == 1;
+            assert_eq!(
+                odd.unwrap(),
+                expected.iter().filter(is_odd).map(|&(pair, ())| (pair, pair[1])).collect::<Vec<_>>()
+            );
+        }
+        assert_eq!(
+            Overlaps::new(&boxes, Vec::new(), true).pairs(|_, _| Some(()), Limits { found: 0, asked: 0 }),
+            Ok(vec![])
+        );
+    }
 }

@@ -22,7 +22,7 @@ pub enum Doubt {
     Empty,
     /// An edge has an odd number of faces: nothing is inside.
     Open,
-    /// Faces intersect.
+    /// Faces pass through each other.
     Intersecting,
     /// A shell has only one side.
     OneSided,
@@ -71,8 +71,11 @@ pub struct Report {
     pub pinched_vertices: Vec<u32>,
     /// Edges along which faces run the same way: the normals on the two sides contradict each other.
     pub clashing_edges: Vec<[u32; 2]>,
-    /// Pairs of faces that have more in common than the vertices they share: exactly. Faces of no area are left out.
+    /// Pairs of faces that pass through each other: exactly. Faces of no area are left out.
     pub intersections: Vec<[u32; 2]>,
+    /// Pairs of other faces that have more in common than the vertices they share: a corner or an edge of one lies on the
+    /// other, or they overlap in one plane. Exactly, and without faces of no area. There may still be an inside and an outside.
+    pub touching: Vec<[u32; 2]>,
     /// In the order of their first faces.
     pub shells: Vec<Shell>,
     /// Shells with one side, by first face.
@@ -97,12 +100,13 @@ impl Report {
     }
 
     /// Whether there is nothing to say against the mesh: closed, manifold, outward, and no face that is degenerate, a
-    /// duplicate, or intersects another.
+    /// duplicate, or intersects or touches another.
     pub fn is_clean(&self) -> bool {
         self.verdict == Verdict::Outward
             && self.is_manifold()
             && self.degenerate.is_empty()
             && self.duplicates.is_empty()
             && self.intersections.is_empty()
+            && self.touching.is_empty()
     }
 }

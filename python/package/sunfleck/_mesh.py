@@ -43,7 +43,7 @@ class MeshReport:
     manifold: bool
     """Whether the surface looks like a plane everywhere, or like the edge of one."""
     clean: bool
-    """Closed, manifold, all faces outward, none degenerate, a duplicate, or intersecting another."""
+    """Closed, manifold, all faces outward, none degenerate, a duplicate, or intersecting or touching another."""
     verdict: Literal["outward", "inward", "mixed", "unknown"]
     """Which way the normals point."""
     doubt: Literal["empty", "open", "intersecting", "one-sided", "undecided", "disputed"] | None
@@ -63,7 +63,10 @@ class MeshReport:
     clashing_edges: NDArray[np.uint32]
     """`[n, 2]`: edges along which faces run the same way."""
     intersections: NDArray[np.uint32]
-    """`[n, 2]`: pairs of faces that have more in common than the vertices they share."""
+    """`[n, 2]`: pairs of faces that pass through each other."""
+    touching: NDArray[np.uint32]
+    """`[n, 2]`: pairs of other faces that have more in common than the vertices they share: a corner or an edge of one lies on
+    the other, or they overlap in one plane."""
     one_sided: NDArray[np.uint32]
     """Shells with one side, by first face."""
     disputed: NDArray[np.uint32]
@@ -78,7 +81,7 @@ def mesh_check(
     """Whether a mesh is closed, manifold and free of intersections, and which of its faces point inward.
 
     `vertices` is `[n, 3]`, taken in double precision, `faces` `[m, 3]`, anticlockwise as seen from outside. Without
-    `intersections` faces are taken not to intersect. The report does not depend on `lazy` (build the tree where rays come),
+    `intersections` faces are taken neither to intersect nor to touch. The report does not depend on `lazy` (build the tree where rays come),
     `parallel`, or the unit of length.
 
     To turn faces round: `faces[report.inward] = faces[report.inward][:, [0, 2, 1]]`.
@@ -87,7 +90,7 @@ def mesh_check(
     """
     rows = triples(numbers(vertices, np.float64), "coordinates a vertex")
     found = _sunfleck.mesh_check(rows, _faces(faces), intersections, lazy, parallel)
-    for name in ("duplicates", "open_edges", "crowded_edges", "clashing_edges", "intersections"):
+    for name in ("duplicates", "open_edges", "crowded_edges", "clashing_edges", "intersections", "touching"):
         found[name] = found[name].reshape(-1, 2)
     found["shells"] = [Shell(*shell) for shell in found["shells"]]
     return MeshReport(**found)

@@ -64,20 +64,20 @@ class KdTree:
         Weights are the barycentric ones of the second and third corner; that of the first is what they lack of 1. Of hits at
         the same t it is the one of the lowest face. Where nothing is hit, t is infinite, the face `len(tree)`, weights 0.
         """
-        t, faces, weights = self._tree.nearest(*self._rays(origins, directions, t_min, t_max))
+        t, faces, weights = self._tree.nearest(self._rays(origins, directions, t_min, t_max))
         return t, faces, weights.reshape(-1, 2)
 
     def any(
         self, origins: ArrayLike, directions: ArrayLike, *, t_min: ArrayLike = 0.0, t_max: ArrayLike = math.inf
     ) -> NDArray[np.bool_]:
         """Whether each ray hits anything, `[k]`."""
-        return self._tree.any(*self._rays(origins, directions, t_min, t_max))
+        return self._tree.any(self._rays(origins, directions, t_min, t_max))
 
     def count(
         self, origins: ArrayLike, directions: ArrayLike, *, t_min: ArrayLike = 0.0, t_max: ArrayLike = math.inf
     ) -> NDArray[np.uint32]:
         """How many triangles each ray hits, `[k]`."""
-        return self._tree.count(*self._rays(origins, directions, t_min, t_max))
+        return self._tree.count(self._rays(origins, directions, t_min, t_max))
 
     def all(
         self, origins: ArrayLike, directions: ArrayLike, *, t_min: ArrayLike = 0.0, t_max: ArrayLike = math.inf
@@ -86,11 +86,13 @@ class KdTree:
 
         Those of ray i are `t[offsets[i]:offsets[i + 1]]` and so on, in order of t, and at the same t of the face.
         """
-        offsets, t, faces, weights = self._tree.all(*self._rays(origins, directions, t_min, t_max))
+        offsets, t, faces, weights = self._tree.all(self._rays(origins, directions, t_min, t_max))
         # What lies in memory is below 2^63: the same bits.
         return offsets.view(np.int64), t, faces, weights.reshape(-1, 2)
 
-    def _rays(self, origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike, t_max: ArrayLike) -> list[NDArray[Any]]:
+    def _rays(
+        self, origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike, t_max: ArrayLike
+    ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
         ends = [numbers(values, self.dtype) for values in (origins, directions)]
         limits = [numbers(values, self.dtype) for values in (t_min, t_max)]
         rows = [triples(end.reshape(1, 3) if end.shape == (3,) else end, "coordinates a ray") for end in ends]
@@ -101,4 +103,5 @@ class KdTree:
         if any(length not in (1, n) for length in lengths):
             raise ValueError(f"origins, directions and ranges are of {', '.join(map(str, lengths))} rays: not as many")
         spread = [np.broadcast_to(row, (n, 3)) for row in rows] + [np.broadcast_to(limit, (n,)) for limit in limits]
-        return [np.require(array, requirements=["C", "A"]) for array in spread]
+        origin, direction, least, most = (np.require(array, requirements=["C", "A"]) for array in spread)
+        return origin, direction, least, most

@@ -66,14 +66,21 @@ fn format(args: &MeshCheckArgs, path: &Path) -> Result<Format> {
     Ok(format)
 }
 
-fn read(path: &Path) -> Result<Loaded> {
-    let is_gltf = |e: &std::ffi::OsStr| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb");
-    if !path.extension().is_some_and(is_gltf) {
-        return Ok(io::read(path)?);
+/// The mesh of a file in any format; warnings go to the error stream.
+pub fn read(path: &Path) -> Result<Loaded> {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    match extension.as_str() {
+        "gltf" | "glb" => {
+            let (loaded, warnings) = load::load_gltf_mesh(path)?;
+            warnings.iter().for_each(|warning| eprintln!("sunfleck: warning: {warning}"));
+            Ok(loaded)
+        }
+        "obj" | "ply" | "stl" | "off" | "node" | "face" => Ok(io::read(path)?),
+        _ => {
+            let known = io::EXTENSIONS;
+            bail!("{}: the extension {extension:?} is none of .gltf, .glb, {known}", path.display())
+        }
     }
-    let (loaded, warnings) = load::load_gltf_mesh(path)?;
-    warnings.iter().for_each(|warning| eprintln!("sunfleck: warning: {warning}"));
-    Ok(loaded)
 }
 
 /// Why there is no telling.
@@ -81,7 +88,7 @@ fn words(doubt: Doubt) -> &'static str {
     match doubt {
         Doubt::Empty => "there is no face with three different corners",
         Doubt::Open => "the mesh is not closed",
-        Doubt::Intersecting => "faces intersect (--no-intersections judges as if they did not)",
+        Doubt::Intersecting => "faces pass through each other (--no-intersections judges as if they did not)",
         Doubt::OneSided => "the surface has only one side",
         Doubt::Undecided => "faces coincide, or are smaller than rounding",
         Doubt::Disputed => "rays contradict each other",
@@ -148,6 +155,10 @@ impl InFile<'_> {
             0 => "none".into(),
             n => format!("{}: {}", plural(n, "pair"), some_pairs(pairs)),
         };
+        let of_contacts = |pairs: &[[u32; 2]]| match self.args.no_intersections {
+            true => "not looked for".into(),
+            false => of_pairs(&self.pairs(pairs)),
+        };
         let mut rows = vec![
             (
                 "vertices",
@@ -165,6 +176,7 @@ impl InFile<'_> {
                 "closed",
                 match report.open_edges.len() {
                     _ if report.is_closed() => "yes".into(),
+                    0 => "no: there is no face with three different corners".into(),
                     n => fault(n, "open edge", some_pairs(&report.open_edges)),
                 },
             ),
@@ -184,13 +196,8 @@ impl InFile<'_> {
             ("normals", self.normals()),
             ("degenerate", of_faces(&self.faces(&report.degenerate))),
             ("duplicate", of_pairs(&self.pairs(&report.duplicates))),
-            (
-                "intersecting",
-                match self.args.no_intersections {
-                    true => "not looked for".into(),
-                    false => of_pairs(&self.pairs(&report.intersections)),
-                },
-            ),
+            ("intersecting", of_contacts(&report.intersections)),
+            ("touching", of_contacts(&report.touching)),
         ];
         if !report.disputed.is_empty() {
             rows.push(("disputed", of_faces(&self.faces(&report.disputed))));
@@ -244,6 +251,7 @@ impl InFile<'_> {
             "degenerate": self.faces(&report.degenerate),
             "duplicates": self.pairs(&report.duplicates),
             "intersections": (!self.args.no_intersections).then(|| self.pairs(&report.intersections)),
+            "touching": (!self.args.no_intersections).then(|| self.pairs(&report.touching)),
             "open_edges": report.open_edges,
             "crowded_edges": report.crowded_edges,
             "clashing_edges": report.clashing_edges,

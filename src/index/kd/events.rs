@@ -206,7 +206,10 @@ fn merge(list: &mut Vec<Event>, new: &[Event]) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::clip::Aabb;
+    use super::super::sah::Sah;
     use super::*;
+    use crate::math::rng::pcg4d;
 
     #[test]
     fn words_are_in_the_order_of_places_then_kinds_and_keep_both() {
@@ -218,6 +221,37 @@ mod tests {
                 assert!((place(e), kind(e), e & INDEX) == (at, k, 5));
                 assert!(last < Some(e));
                 last = Some(e);
+            }
+        }
+    }
+
+    /// The cheapest plane and its cost, in bits: of many triangles, some of them planar, in cells of which either end is cheap.
+    #[test]
+    fn a_sweep_on_several_threads_counts_as_one_does() {
+        for seed in 0..6 {
+            let parts: Vec<Part> = (0..3 * PIECE as u32)
+                .map(|i| {
+                    let draw = pcg4d([i, seed, 2, 9]).map(|word| (word >> 8) as f32 / (1u32 << 24) as f32);
+                    let min = [draw[0].powi(1 + seed as i32), 1.0 - draw[1].powi(1 + seed as i32), draw[2]];
+                    let size = if i % 3 == 0 { 0.0 } else { 0.01 * draw[3] };
+                    Part { face: i, bounds: Aabb { min, max: min.map(|x| x + size) } }
+                })
+                .collect();
+            let cell = Aabb { min: [-0.1; 3], max: [1.1; 3] };
+            let sah = Sah::default();
+            let [alone, beside] = [false, true].map(|parallel| {
+                let mut cheapest = Cheapest::new(&sah, &cell);
+                Events::of(&parts, parallel).offer(parts.len(), &mut cheapest, parallel);
+                cheapest.best
+            });
+            assert_eq!(alone, beside);
+            // Each part of the sweep by itself, not only the best of all.
+            let events = Events::of(&parts, false);
+            for (axis, events) in events.0.iter().enumerate() {
+                let cheapest = Cheapest::new(&sah, &cell);
+                let mut alone = cheapest.clone();
+                sweep(events, axis, (0, parts.len()), &mut alone);
+                assert_eq!(sweep_beside(events, axis, (0, parts.len()), &cheapest).best, alone.best);
             }
         }
     }

@@ -67,7 +67,7 @@ pub enum Error {
         vertices: usize,
     },
     /// Products of its lengths would vanish.
-    #[error("a mesh of half-size {0} is too small for its precision")]
+    #[error("a mesh of half-size {0:e} is too small for its precision")]
     TooSmall(f64),
     /// More triangles, or a larger tree, than indices count.
     #[error("{0} triangles are too many")]

@@ -63,7 +63,8 @@ pub struct Cheapest<'a> {
     rims: [f64; 3],
     /// κ_I over the cell's area.
     weight: f64,
-    best: Option<(f64, Plane)>,
+    /// Its cost, too.
+    pub(super) best: Option<(f64, Plane)>,
 }
 
 impl<'a> Cheapest<'a> {
@@ -123,5 +124,72 @@ impl<'a> Cheapest<'a> {
     pub fn worth(self, n: usize) -> Option<Plane> {
         let (cost, plane) = self.best?;
         (cost < self.sah.intersection * n as f64).then_some(plane)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CELL: Aabb = Aabb { min: [0.0; 3], max: [1.0; 3] };
+    const SAH: Sah = Sah { traversal: 0.5, intersection: 2.0, empty: 0.75, max_depth: 64 };
+
+    fn offered(offers: &[(usize, f32, [usize; 3])]) -> Option<(f64, Plane)> {
+        let mut cheapest = Cheapest::new(&SAH, &CELL);
+        for &(axis, at, [below, planar, above]) in offers {
+            cheapest.offer(axis, at, Counts { below, planar, above });
+        }
+        cheapest.best
+    }
+
+    /// Half the areas are 3, 1.5 below a quarter and 2.5 above it.
+    #[test]
+    fn costs_are_those_of_the_definition() {
+        let cost = |at, counts| offered(&[(1, at, counts)]).map(|(cost, plane)| (cost, plane.planar_below));
+        let of = |below: f64, above: f64| 0.5 + 2.0 * (1.5 * below + 2.5 * above) / 3.0;
+        let near = |found: Option<(f64, bool)>, expected: f64, below: bool| {
+            let (cost, planar_below) = found.unwrap();
+            assert!((cost - expected).abs() < 1e-12 && planar_below == below, "{cost} {expected}");
+        };
+        near(cost(0.25, [3, 0, 4]), of(3.0, 4.0), true);
+        // Those in the plane go where they cost less; they do not make a half full.
+        near(cost(0.25, [3, 2, 4]), of(5.0, 4.0), true);
+        near(cost(0.75, [3, 2, 4]), of(6.0, 3.0), false);
+        near(cost(0.25, [0, 2, 4]), 0.75 * of(2.0, 4.0), true);
+        near(cost(0.25, [3, 2, 0]), 0.75 * of(5.0, 0.0), true);
+        near(cost(0.75, [0, 0, 3]), 0.75 * of(3.0, 0.0), true);
+        near(cost(0.75, [3, 0, 0]), 0.75 * of(0.0, 3.0), true);
+        // Nothing is split on a face of the cell.
+        assert_eq!((cost(0.0, [0, 2, 4]), cost(1.0, [4, 2, 0])), (None, None));
+    }
+
+    #[test]
+    fn of_equal_planes_the_first_axis_the_lowest_place_and_below() {
+        let all = [(0, 0.25, [3, 0, 3]), (0, 0.75, [3, 0, 3]), (1, 0.25, [3, 0, 3]), (2, 0.75, [3, 0, 3])];
+        for order in [[0, 1, 2, 3], [3, 2, 1, 0], [2, 0, 3, 1]] {
+            let (_, plane) = offered(&order.map(|i| all[i])).unwrap();
+            assert_eq!(plane, Plane { axis: 0, at: 0.25, planar_below: true });
+        }
+        assert!(offered(&[(0, 0.5, [3, 1, 3])]).unwrap().1.planar_below);
+    }
+
+    #[test]
+    fn a_split_that_costs_as_much_as_a_leaf_is_none() {
+        let worth = |n| {
+            let mut cheapest = Cheapest::new(&SAH, &CELL);
+            // 0.75 · (0.5 + 2 · 2 · 2.25 / 3) = 2.625
+            cheapest.offer(0, 0.625, Counts { below: 2, planar: 0, above: 0 });
+            cheapest.worth(n)
+        };
+        assert!(worth(2).is_some() && worth(1).is_none());
+        let sah = Sah { traversal: 1.0, intersection: 1.0, empty: 1.0, max_depth: 64 };
+        let mut cheapest = Cheapest::new(&sah, &CELL);
+        // 1 + (2 · 2 + 2 · 2 + 2 · 2) / 3 = 5 = n
+        cheapest.offer(2, 0.5, Counts { below: 3, planar: 0, above: 3 });
+        assert_eq!((cheapest.clone().worth(5), cheapest.worth(6).is_some()), (None, true));
+        // A cell without area.
+        let mut cheapest = Cheapest::new(&sah, &Aabb { max: [1.0, 0.0, 0.0], ..CELL });
+        cheapest.offer(0, 0.5, Counts { below: 1, planar: 0, above: 1 });
+        assert_eq!(cheapest.worth(1000), None);
     }
 }

@@ -25,6 +25,9 @@ pub use stl::read_stl;
 pub use tetgen::read_tetgen;
 pub use write::{Format, write};
 
+/// What [`read`] reads, for messages.
+pub const EXTENSIONS: &str = ".obj, .ply, .stl, .off, .node and .face";
+
 /// Faces of a file, at most, triangulated: as many as a kd-tree takes.
 const MAX_FACES: usize = 1 << 28;
 /// Vertices of a file, at most.
@@ -99,9 +102,8 @@ pub fn read(path: &Path) -> Result<Loaded, Error> {
         "ply" => read_ply(file, size),
         "stl" => read_stl(file, size),
         "off" => read_off(file),
-        _ => {
-            Err(format!("the extension {extension:?} is none of .obj, .ply, .stl, .off, .gltf, .glb, .node and .face"))
-        }
+        "gltf" | "glb" => Err("glTF is read by sunfleck::scene::load::load_gltf_mesh".into()),
+        _ => Err(format!("the extension {extension:?} is none of {EXTENSIONS}")),
     };
     loaded.map_err(fail)
 }

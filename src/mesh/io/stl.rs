@@ -21,14 +21,18 @@ pub fn read_stl(mut input: impl BufRead, size: u64) -> Result<Loaded, String> {
         _ => 0,
     };
     let is_binary = head.len() == HEAD && size == HEAD as u64 + FACET as u64 * u64::from(n);
+    // Binary heads may say so, too.
+    let is_solid = head.trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
+    let is_text = head.iter().all(|b| !b.is_ascii_control() || b.is_ascii_whitespace());
     if is_binary {
         binary(input, n as usize)
-    } else if head.trim_ascii_start().get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid")) {
+    } else if is_solid && (is_text || head.len() < HEAD) {
         text((&head[..]).chain(input))
     } else if head.len() < HEAD {
         Err(format!("neither begins with \"solid\" nor has the {HEAD} bytes that a binary STL begins with"))
     } else {
-        Err(format!("{n} facets of {FACET} bytes are promised, in a file of {size} bytes"))
+        let promised = HEAD as u64 + FACET as u64 * u64::from(n);
+        Err(format!("the head promises {n} facets, which makes {promised} bytes, in a file of {size} bytes"))
     }
 }
 

@@ -53,6 +53,15 @@ fn edges_of_more_than_two_faces() {
     assert_eq!((report.crowded_edges.as_slice(), report.verdict), (&[[0, 3]][..], Verdict::Outward), "{report:?}");
     assert!(report.is_closed() && !report.is_manifold() && !report.is_clean() && report.clashing_edges.is_empty());
     assert_eq!((report.shells.len(), report.pinched_vertices.len()), (2, 0));
+    // Whatever order the faces at the edge come in.
+    let mut mixed = two.clone();
+    mixed.faces = [0, 4, 1, 5, 2, 6, 3, 7].map(|face| two.faces[face]).to_vec();
+    let report = check(&mixed);
+    assert_eq!((report.shells.len(), report.verdict), (2, Verdict::Outward));
+    // One of the four the wrong way round.
+    two.flip(&[1]);
+    let report = check(&two);
+    assert_eq!((report.clashing_edges, report.inward), (vec![[0, 1], [0, 3], [1, 3]], vec![1]));
     // A wall inside.
     let mut wall = bumpy(0, 1);
     wall.vertices.push([0.0; 3]);
@@ -78,16 +87,21 @@ fn vertices_of_more_than_one_fan() {
 #[test]
 fn vertices_in_the_same_place_are_one() {
     let whole = bumpy(2, 4);
-    let corners = whole.faces.iter().flatten().map(|&v| whole.vertices[v as usize]);
-    let n = whole.faces.len();
-    let soup = Mesh {
-        // −0 is 0.
-        vertices: corners.map(|p| p.map(|x| if x == 0.0 { -0.0 } else { x })).collect(),
-        faces: (0..n as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
-    };
-    let report = check(&soup);
-    assert!(report.is_clean(), "{report:?}");
-    assert_eq!((report.merged_vertices, report.unused_vertices), (3 * n - whole.vertices.len(), 0));
+    for whole in [whole, tetrahedron()] {
+        let corners = whole.faces.iter().flatten().map(|&v| whole.vertices[v as usize]);
+        let n = whole.faces.len();
+        let soup = Mesh {
+            // −0 is 0.
+            vertices: (0..)
+                .zip(corners)
+                .map(|(i, p)| p.map(|x| if x == 0.0 && i % 2 == 1 { -0.0 } else { x }))
+                .collect(),
+            faces: (0..n as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+        };
+        let report = check(&soup);
+        assert!(report.is_clean(), "{report:?}");
+        assert_eq!((report.merged_vertices, report.unused_vertices), (3 * n - whole.vertices.len(), 0));
+    }
 }
 
 #[test]
@@ -105,14 +119,15 @@ fn faces_without_area() {
     mesh.faces.extend([[4, 1, 3], [0, 1, 4]]);
     let report = check(&mesh);
     assert_eq!((report.degenerate.as_slice(), report.open_edges.len()), (&[5][..], 0));
-    // They share less than they touch in.
-    assert_eq!((report.intersections, report.verdict), (vec![[0, 1], [0, 4]], Verdict::Unknown(Doubt::Intersecting)));
+    // They share less than they touch in, and there is an inside all the same.
+    assert_eq!((report.touching.as_slice(), report.verdict), (&[[0, 1], [0, 4]][..], Verdict::Outward));
+    assert!(report.intersections.is_empty() && !report.is_clean());
     let without =
         |mesh: &Mesh| mesh::check(mesh, &CheckOptions { intersections: false, ..CheckOptions::default() }).unwrap();
-    assert_eq!(without(&mesh).verdict, Verdict::Outward);
+    assert_eq!((without(&mesh).verdict, without(&mesh).touching), (Verdict::Outward, vec![]));
     // Its neighbours say which way it runs.
     mesh.flip(&[5]);
-    assert_eq!(without(&mesh).inward, [5]);
+    assert_eq!(check(&mesh).inward, [5]);
     mesh.faces.pop();
     assert_eq!(check(&mesh).verdict, Verdict::Unknown(Doubt::Open));
 }

@@ -1,9 +1,11 @@
 //! Which way normals point: exactly the faces that were flipped, at any unit and offset.
 
 use std::env;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::sync::Mutex;
 
-use sunfleck::index::kd::{Builder, EveryTriangle, KdOptions, KdTree};
+use sunfleck::index::kd::{Builder, EveryTriangle, Hit, KdOptions, KdTree, Ray, RaySearch, Triangles};
 use sunfleck::mesh::orientation::{Facing, by_rays};
 use sunfleck::mesh::{self, CheckOptions, Doubt, Mesh, Verdict};
 
@@ -123,6 +125,67 @@ fn cube() -> Mesh {
         }
     }
     mesh
+}
+
+/// Most of a shell says how it lies, whichever way its first face looks.
+#[test]
+fn a_shell_lies_as_most_of_its_faces() {
+    let mut mesh = bumpy(1, 6);
+    let n = mesh.faces.len();
+    for (flipped, facing) in [(vec![0], Facing::Outward), (vec![0, 1, 5], Facing::Outward), (vec![5], Facing::Outward)]
+    {
+        mesh.flip(&flipped);
+        let report = check(&mesh);
+        let [shell] = &report.shells[..] else { panic!("{report:?}") };
+        assert_eq!((shell.facing, shell.minority, shell.faces), (Some(facing), flipped.len(), n));
+        mesh.flip(&flipped);
+    }
+    let mut mesh = reversed(mesh);
+    mesh.flip(&[0]);
+    let report = check(&mesh);
+    assert_eq!((report.shells[0].facing, report.shells[0].minority), (Some(Facing::Inward), 1));
+}
+
+/// A mesh in which rays find nothing, not even where they begin; it writes them down.
+struct Blind {
+    triangles: Triangles<f64>,
+    rays: Mutex<Vec<Ray<f64>>>,
+}
+
+impl RaySearch<f64> for Blind {
+    fn triangles(&self) -> &Triangles<f64> {
+        &self.triangles
+    }
+
+    fn try_hits<B>(&self, ray: &Ray<f64>, _: impl FnMut(Hit<f64>) -> ControlFlow<B, f64>) -> ControlFlow<B> {
+        self.rays.lock().unwrap().push(*ray);
+        ControlFlow::Continue(())
+    }
+}
+
+/// Those that are cast again leave on the side of the normal, too, each in a way of its own.
+#[test]
+fn every_ray_leaves_on_the_side_of_the_normal() {
+    let mesh = bumpy(1, 8);
+    for &[a, b, c] in &mesh.faces {
+        let [a, b, c] = [a, b, c].map(|v| mesh.vertices[v as usize]);
+        let blind =
+            Blind { triangles: Triangles::new(vec![a, b, c], vec![[0, 1, 2]]).unwrap(), rays: Mutex::default() };
+        assert_eq!(by_rays(&blind, false), [Facing::Undecided]);
+        let rays = blind.rays.into_inner().unwrap();
+        assert!(rays.len() > 16, "{} rays", rays.len());
+        let outward = |d: [f64; 3]| -> f64 { (0..3).map(|i| d[i] * a[i]).sum() };
+        let [ab, ac] = [b, c].map(|p| -> [f64; 3] { std::array::from_fn(|i| p[i] - a[i]) });
+        let normal = std::array::from_fn(|i| {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            ab[j] * ac[k] - ab[k] * ac[j]
+        });
+        assert!(outward(normal) > 0.0);
+        for (i, ray) in rays.iter().enumerate() {
+            assert!((0..3).map(|i| ray.direction()[i] * normal[i]).sum::<f64>() > 0.0, "{ray:?}");
+            assert!(rays[..i].iter().all(|other| other.direction() != ray.direction()));
+        }
+    }
 }
 
 #[test]

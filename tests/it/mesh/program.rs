@@ -56,10 +56,14 @@ fn the_verdict_is_the_exit_code() {
     );
     let mut two = bumpy(1, 1);
     two = super::together(&two, &placed(&two, 1.0, [1.0, 0.0, 0.0]));
-    expect(&two, &[], 1, &["cannot be said: faces intersect", "intersecting  "]);
+    expect(&two, &[], 1, &["cannot be said: faces pass through", "intersecting  "]);
     expect(&two, &["--no-intersections"], 1, &["rays contradict", "not looked for", "disputed"]);
+    expect(&Mesh { faces: Vec::new(), ..mesh }, &[], 1, &["closed        no: there is no face"]);
+    let unknown = folder.path().join("a.step");
+    fs::write(&unknown, b"").unwrap();
     for (args, code, text) in [
         (&[][..], 2, "MESH"),
+        (&[unknown.to_str().unwrap()], 1, "a.step: the extension \"step\" is none of .gltf, .glb, .obj, .ply"),
         (&["no.obj"], 1, "no.obj: No such file or directory"),
         (&[name, "--fix"], 2, "--output <OUT>"),
         (&[name, "-o", "b.obj"], 2, "--fix"),
@@ -140,9 +144,16 @@ fn json_counts_the_faces_of_the_file() {
     assert_eq!((&json["closed"], &json["manifold"]), (&true.into(), &true.into()));
     assert_eq!(json["shells"][0]["facing"], "outward");
     assert_eq!(json["clashing_edges"].as_array().unwrap().len(), 6);
-    for list in
-        ["disputed", "degenerate", "duplicates", "intersections", "open_edges", "crowded_edges", "pinched_vertices"]
-    {
+    for list in [
+        "disputed",
+        "degenerate",
+        "duplicates",
+        "intersections",
+        "touching",
+        "open_edges",
+        "crowded_edges",
+        "pinched_vertices",
+    ] {
         assert_eq!(json[list], serde_json::json!([]), "{list}");
     }
 }

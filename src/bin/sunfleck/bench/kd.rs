@@ -56,7 +56,7 @@ pub struct KdArgs {
     #[arg(long, value_name = "N,…", value_delimiter = ',', allow_hyphen_values = true, value_parser = clap::value_parser!(u32).range(0..=9))]
     levels: Vec<u32>,
 
-    /// Scale this mesh in place of the asteroid: .obj, .ply, .stl, .off, or TetGen's .node or .face
+    /// Scale this mesh in place of the asteroid: any file that mesh-check reads
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
 
@@ -214,7 +214,7 @@ pub fn run(args: &KdArgs) -> Result<()> {
 }
 
 fn read(path: &std::path::Path) -> Result<Mesh> {
-    let mesh = sunfleck::mesh::io::read(path)?.mesh;
+    let mesh = crate::mesh_check::read(path)?.mesh;
     ensure!(!mesh.faces.is_empty(), "{}: there are no faces", path.display());
     mesh.triangles().with_context(|| path.display().to_string())?;
     Ok(mesh)

@@ -5,10 +5,21 @@ use std::path::PathBuf;
 use clap::Args;
 
 const HELP: &str = "\
-Normals are judged where the mesh is closed and no faces intersect: by a ray from each face, which
-must agree with the way that neighbours run along their common edge. Nothing depends on the unit of
-length. Vertices in exactly the same place are one. Faces and vertices are counted from 0, in the
-order of the file; an OBJ's own indices are one more.
+A line is printed for each question, with the first ten faces, edges (a-b, by their vertices) or
+pairs of faces (a-b) at fault:
+  closed        every edge has two faces, or another even number
+  manifold      no edge has more than two, and the faces around a vertex form one fan
+  winding       neighbours run opposite ways along their common edge
+  normals       outward, inward, or mixed: which faces point inward
+  degenerate    faces of no area
+  duplicate     faces of the same three corners as an earlier one
+  intersecting  faces that pass through each other
+  touching      faces that lie on each other with a corner, an edge or a part of their area
+
+Normals are judged where the mesh is closed and no faces pass through each other: by a ray from each
+face, which must agree with the way that neighbours run along their common edge. There is no
+tolerance, and nothing depends on the unit of length. Vertices in exactly the same place are one.
+Faces and vertices are counted from 0, in the order of the file; an OBJ's own indices are one more.
 
 Read are .obj, .ply, .stl, .off, .gltf, .glb, and .node with .face beside it (TetGen); written are
 .obj, .ply, .stl (in single precision) and .off.
@@ -18,13 +29,13 @@ Examples:
   sunfleck mesh-check scan.ply --json
   sunfleck mesh-check part.stl --fix -o fixed.obj
 
-Exit codes: 0 closed, manifold, all normals outward, no degenerate, duplicate or intersecting faces
-(with --fix: so is what was written); 1 not so, or an error; 2 wrong usage.";
+Exit codes: 0 closed, manifold, all normals outward, no degenerate, duplicate, intersecting or
+touching faces (with --fix: so is what was written); 1 not so, or an error; 2 wrong usage.";
 
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub struct MeshCheckArgs {
-    /// The mesh
+    /// The file of the mesh
     #[arg(value_name = "MESH")]
     pub mesh: PathBuf,
     /// Turn round the faces that point inward; needs -o
@@ -36,7 +47,7 @@ pub struct MeshCheckArgs {
     /// Print JSON, with all faces
     #[arg(long)]
     pub json: bool,
-    /// Do not look for faces that intersect, and judge as if there were none
+    /// Do not look for faces that intersect or touch, and judge as if there were none
     #[arg(long)]
     pub no_intersections: bool,
     /// CPU threads [default: all]

@@ -1,13 +1,15 @@
-//! What the window does when it loses its device: in a process of its own, for it needs a display.
+//! What the window does when it or the renderer loses its device: in a process of its own, for it needs a display.
 
 use std::process::Command;
+use std::sync::Arc;
 use std::time::Instant;
 
 use eframe::egui;
 use egui::ViewportCommand::Close;
+use sunfleck::gpu::Context;
 
 use super::super::app::{First, Viewer};
-use super::super::engine::{Choice, Engine, Limits};
+use super::super::engine::{Choice, Engine, Limits, Phase};
 use super::super::window::{self, Bell, FEWEST_FRAMES, Guest};
 use super::PATIENCE;
 use crate::devices::Device;
@@ -93,6 +95,34 @@ impl Guest for Vandal {
     }
 }
 
+/// Breaks the renderer's device, and looks on for some frames; or looks on until there is another picture.
+struct Onlooker {
+    breaks: Option<Arc<Context>>,
+    estimate: u64,
+    failed_frames: usize,
+    began: Instant,
+}
+
+impl Guest for Onlooker {
+    fn after_frame(&mut self, viewer: &Viewer, ui: &egui::Ui, _: &eframe::Frame) {
+        ui.ctx().request_repaint();
+        assert!(self.began.elapsed() < PATIENCE, "{:?}", viewer.now.phase);
+        let Some(frame) = &viewer.now.frame else { return };
+        let is_over = match &self.breaks {
+            Some(renderer) => {
+                renderer.destroy();
+                self.failed_frames += usize::from(matches!(viewer.now.phase, Phase::Failed(_)));
+                self.failed_frames >= FEWEST_FRAMES
+            }
+            None => frame.estimate > self.estimate,
+        };
+        self.estimate = self.estimate.max(frame.estimate);
+        if is_over {
+            ui.ctx().send_viewport_cmd(Close);
+        }
+    }
+}
+
 /// Runs the test below under Xvfb.
 #[test]
 #[cfg(target_os = "linux")]
@@ -130,13 +160,24 @@ fn loses_its_device() {
         options
     };
     let bell = Bell::default();
-    let engine = Engine::start(Device::Cpu(sunfleck::scene::Accelerator::Bvh), bell.wake()).unwrap();
+    let device = crate::devices::open_backend("gpu").unwrap();
+    let Device::Gpu(renderer, _) = &device else { unreachable!("asked for a GPU") };
+    let renderer = Arc::clone(renderer);
+    let engine = Engine::start(device, bell.wake()).unwrap();
     let set = ["size=32x24", "photons=500"].map(str::to_owned).to_vec();
     let choice = Some(Choice { name: "cornell".into(), set });
     let first = First { choice, limits: Limits::default(), output: Some(rescued.clone()), reference: None };
     let mut viewer = Viewer::new(engine, bell.wake(), first);
 
-    // Twice: what was rendered is kept, and grows.
+    // The renderer's: the window stays, with the picture, and it can be tried again.
+    let look_on = |breaks, estimate| Onlooker { breaks, estimate, failed_frames: 0, began: Instant::now() };
+    let mut onlooker = look_on(Some(renderer), 0);
+    window::run(&mut viewer, &bell, options, &mut onlooker).unwrap();
+    assert!(matches!(viewer.now.phase, Phase::Failed(_)) && viewer.picture.painted().is_some());
+    viewer.retry();
+    window::run(&mut viewer, &bell, options, &mut look_on(None, onlooker.estimate)).unwrap();
+
+    // The window's, twice: what was rendered is kept, and grows.
     let mut vandal = Vandal::new(When::BetweenFrames, 2, FEWEST_FRAMES);
     window::run(&mut viewer, &bell, options, &mut vandal).unwrap();
     let ((estimate, before), (same, after)) = (vandal.before.unwrap(), vandal.after_all.unwrap());
