@@ -6,6 +6,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::bsdf::{Bsdf, Lobes, Transport};
+use crate::device::{Error, Interrupt};
 use crate::index::PointBvh;
 use crate::layout::{EYE_GATHER, EYE_GLOSSY, EyeVertex, FRAME_CONSTANT_KERNEL, Frame, Photon};
 use crate::math::oct;
@@ -32,11 +33,13 @@ pub fn gather(
     vertices: &[EyeVertex],
     first_radii: &[f32],
     radiance: &mut [[f32; 3]],
-) {
+    interrupt: &Interrupt,
+) -> Result<(), Error> {
     let rows = (BAND / width.max(1)).clamp(1, TILE);
     let band = (rows * width).max(1);
     let bands = radiance.par_chunks_mut(band).zip(vertices.par_chunks(band)).zip(first_radii.par_chunks(band));
-    bands.for_each(|((radiance, vertices), first_radii)| {
+    bands.try_for_each(|((radiance, vertices), first_radii)| {
+        interrupt.check()?;
         for (out, vertex) in radiance.iter_mut().zip(vertices) {
             *out = vertex.radiance;
         }
@@ -61,7 +64,8 @@ pub fn gather(
                 radiance[pixel] = estimate.radiance().to_array();
             },
         );
-    });
+        Ok(())
+    })
 }
 
 /// The pixels of a band that gather, tile by tile.

@@ -18,11 +18,13 @@ use rayon::prelude::*;
 
 use crate::index::PointBvh;
 use crate::layout::{Camera, EyeVertex, Frame, Photon};
-use crate::ppm::{Error, Film, StageTimes, Stages, film};
+use crate::ppm::{Error, Film, Interrupt, StageTimes, Stages, film};
 use crate::scene::PackedScene;
 
 /// Paths a task takes at once: enough to hide its cost, few enough to spread.
 const CHUNK: u32 = 4096;
+/// The same of pixels.
+const PIXELS: usize = 512;
 
 /// Runs the stages with rayon, in the thread pool it is called from.
 pub struct CpuStages {
@@ -38,6 +40,7 @@ pub struct CpuStages {
     film: Vec<[f32; 4]>,
     n_iterations: u32,
     times: StageTimes,
+    interrupt: Interrupt,
 }
 
 impl CpuStages {
@@ -56,6 +59,7 @@ impl CpuStages {
             film: Vec::new(),
             n_iterations: 0,
             times: StageTimes::default(),
+            interrupt: Interrupt::default(),
         };
         stages.set_size(size);
         stages
@@ -89,32 +93,45 @@ impl Stages for CpuStages {
         Ok(())
     }
 
+    fn set_interrupt(&mut self, interrupt: Interrupt) {
+        self.interrupt = interrupt;
+    }
+
+    fn interrupt(&self) -> &Interrupt {
+        &self.interrupt
+    }
+
     fn trace_eye(&mut self, frame: &Frame) -> Result<(), Error> {
         let start = Instant::now();
-        let (scene, camera) = (&*self.scene, &self.camera);
-        (0..self.width * self.height)
-            .into_par_iter()
-            .with_min_len(256)
-            .map(|i| eye::trace(scene, camera, frame, i % frame.width, i / frame.width))
-            .collect_into_vec(&mut self.vertices);
+        let (scene, camera, interrupt) = (&*self.scene, &self.camera, &self.interrupt);
+        self.vertices.resize(self.radiance.len(), EyeVertex::default());
+        self.vertices.par_chunks_mut(PIXELS).enumerate().try_for_each(|(chunk, vertices)| {
+            interrupt.check()?;
+            for (i, vertex) in ((chunk * PIXELS) as u32..).zip(vertices) {
+                *vertex = eye::trace(scene, camera, frame, i % frame.width, i / frame.width);
+            }
+            Ok::<_, Error>(())
+        })?;
         self.times.eye = start.elapsed().as_secs_f64();
         Ok(())
     }
 
     fn trace_photons(&mut self, frame: &Frame) -> Result<(), Error> {
         let start = Instant::now();
-        let scene = &*self.scene;
+        let (scene, interrupt) = (&*self.scene, &self.interrupt);
         // In order of the paths, whatever the threads.
-        let parts: Vec<Vec<Photon>> = (0..frame.n_paths.div_ceil(CHUNK))
+        let parts: Result<Vec<Vec<Photon>>, Error> = (0..frame.n_paths.div_ceil(CHUNK))
             .into_par_iter()
             .map(|chunk| {
+                interrupt.check()?;
                 let mut stored = Vec::with_capacity(2 * CHUNK as usize);
                 for path in chunk * CHUNK..((chunk + 1) * CHUNK).min(frame.n_paths) {
                     photons::trace(scene, frame, path, &mut stored);
                 }
-                stored
+                Ok(stored)
             })
             .collect();
+        let parts = parts?;
         self.photons.clear();
         self.photons.reserve(parts.iter().map(Vec::len).sum());
         for part in &parts {
@@ -126,6 +143,7 @@ impl Stages for CpuStages {
 
     fn build_index(&mut self, _frame: &Frame) -> Result<(), Error> {
         let start = Instant::now();
+        self.interrupt.check()?;
         let position = |i: usize| Vec3::from(self.photons[i].position);
         self.tree.rebuild(self.photons.len(), position);
         let photons = &self.photons;
@@ -145,7 +163,8 @@ impl Stages for CpuStages {
             &self.vertices,
             &self.first_radii,
             &mut self.radiance,
-        );
+            &self.interrupt,
+        )?;
         self.times.gather = start.elapsed().as_secs_f64();
         Ok(())
     }

@@ -401,6 +401,15 @@ impl Context {
         Ok(())
     }
 
+    /// Waits until the device has done this, and all before it.
+    pub(super) fn wait_for(&self, submission: wgpu::SubmissionIndex) -> Result<(), Error> {
+        match self.device.poll(wgpu::PollType::Wait { submission_index: Some(submission), timeout: None }) {
+            Ok(_) => self.check(),
+            // A lost device never took it; wgpu says that it is lost only where all is waited for.
+            Err(_) => self.wait(),
+        }
+    }
+
     /// A buffer of at least one byte; `bound` says how much of it one shader sees at once.
     pub(super) fn buffer(
         &self,

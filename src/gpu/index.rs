@@ -136,12 +136,12 @@ impl Index {
         records: &wgpu::BindingResource<'_>,
         words: u32,
         sorted: &Array,
-    ) {
+    ) -> Result<(), Error> {
         self.levels = levels(n);
         if n == 0 {
-            return;
+            return Ok(());
         }
-        self.sort(batch, n, records, words, sorted);
+        self.sort(batch, n, records, words, sorted)?;
 
         let tree = [sorted.all(), self.boxes.all(), self.nodes.all()];
         let [_, n_leaves] = self.levels[0];
@@ -151,6 +151,7 @@ impl Index {
             let arguments = self.arguments([below, n_below, first, n]);
             batch.dispatch(&self.tree_level, &tree, arguments, n.div_ceil(THREADS));
         }
+        Ok(())
     }
 
     /// Records the sort alone, `n` > 0. Call [`Index::reserve_sort`] first.
@@ -161,7 +162,7 @@ impl Index {
         records: &wgpu::BindingResource<'_>,
         words: u32,
         sorted: &Array,
-    ) {
+    ) -> Result<(), Error> {
         let n_blocks = n.div_ceil(BLOCK);
         let n_sorted = n.div_ceil(THREADS * self.keys_a_thread);
         let groups = n.div_ceil(THREADS);
@@ -182,13 +183,16 @@ impl Index {
                 self.totals.all(),
             ];
             let arguments = [n, pass * DIGIT_BITS, n_sorted, self.keys_a_thread];
+            batch.cut_if_interruptible()?;
             batch.dispatch(&self.sort_count, &buffers, arguments, n_sorted);
             batch.dispatch(&self.sort_scan, &buffers, arguments, 1 << DIGIT_BITS);
             batch.dispatch(&self.sort_scatter, &buffers, arguments, n_sorted);
         }
         let last = (N_PASSES % 2) as usize;
         let buffers = [self.order[last].all(), records.clone(), sorted.all()];
+        batch.cut_if_interruptible()?;
         batch.dispatch(&self.permute, &buffers, [n, words, 0, 0], groups);
+        Ok(())
     }
 
     /// With the levels of the tree, which walks and builds of it read.

@@ -8,7 +8,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::context::{Context, Scopes};
 use super::shaders;
-use crate::device::Error;
+use crate::device::{Error, Interrupt};
 
 /// How a kernel uses a storage buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,6 +115,10 @@ pub(super) struct Shared {
     arguments: wgpu::Buffer,
     /// From 1 on.
     groups: Vec<Group>,
+    /// What [`Batch::cut`] asks.
+    pub(super) interrupt: Interrupt,
+    /// What the device was given last, if there is an interrupt.
+    submitted: Mutex<Option<wgpu::SubmissionIndex>>,
 }
 
 impl Shared {
@@ -129,7 +133,12 @@ impl Shared {
         let binding = (uniform(size_of::<Arguments>() as u64, true), wgpu::BindingResource::Buffer(window));
         let mut groups = vec![Group::new(context, "arguments", &[binding])];
         groups.extend(further);
-        Self { arguments, groups }
+        Self { arguments, groups, interrupt: Interrupt::default(), submitted: Mutex::default() }
+    }
+
+    /// Notes what was submitted; what was before it.
+    fn follows(&self, submission: wgpu::SubmissionIndex) -> Option<wgpu::SubmissionIndex> {
+        self.submitted.lock().unwrap_or_else(std::sync::PoisonError::into_inner).replace(submission)
     }
 }
 
@@ -237,16 +246,16 @@ impl<'a> Modules<'a> {
 pub(super) struct Batch<'a> {
     context: &'a Context,
     shared: &'a Shared,
+    label: &'a str,
     scopes: Scopes,
     encoder: wgpu::CommandEncoder,
     arguments: Vec<u8>,
 }
 
 impl<'a> Batch<'a> {
-    pub(super) fn new(context: &'a Context, shared: &'a Shared, label: &str) -> Self {
+    pub(super) fn new(context: &'a Context, shared: &'a Shared, label: &'a str) -> Self {
         let scopes = Scopes::new(&context.device);
-        let encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) });
-        Self { context, shared, scopes, encoder, arguments: Vec::new() }
+        Self { context, shared, label, scopes, encoder: encoder(context, label), arguments: Vec::new() }
     }
 
     /// For copies and timestamps.
@@ -301,15 +310,51 @@ impl<'a> Batch<'a> {
         pass.dispatch_workgroups(groups.div_ceil(rows), rows, 1);
     }
 
+    /// Hands the device what was recorded so far; more can be recorded. With an interrupt, the device is left with no more
+    /// than this to do, or [`Error::Interrupted`] returned.
+    pub(super) fn cut(&mut self) -> Result<(), Error> {
+        let next = encoder(self.context, self.label);
+        let recorded = std::mem::replace(&mut self.encoder, next);
+        let before = hand_over(self.context, self.shared, recorded, &self.arguments);
+        self.arguments.clear();
+        self.context.check()?;
+        self.shared.interrupt.check()?;
+        if let Some(before) = before {
+            self.context.wait_for(before)?;
+            self.shared.interrupt.check()?;
+        }
+        Ok(())
+    }
+
+    /// [`Batch::cut`] where only an interrupt asks for it.
+    pub(super) fn cut_if_interruptible(&mut self) -> Result<(), Error> {
+        if self.shared.interrupt.is_set() { self.cut() } else { Ok(()) }
+    }
+
     /// Hands it all to the device.
     pub(super) fn submit(self) -> Result<(), Error> {
-        if !self.arguments.is_empty() {
-            self.context.queue.write_buffer(&self.shared.arguments, 0, &self.arguments);
-        }
-        self.context.queue.submit([self.encoder.finish()]);
+        hand_over(self.context, self.shared, self.encoder, &self.arguments);
         if let Some(error) = self.scopes.first() {
             return Err(self.context.error(error.to_string()));
         }
         self.context.check()
     }
+}
+
+/// Returns what was submitted before, if there is an interrupt.
+fn hand_over(
+    context: &Context,
+    shared: &Shared,
+    recorded: wgpu::CommandEncoder,
+    arguments: &[u8],
+) -> Option<wgpu::SubmissionIndex> {
+    if !arguments.is_empty() {
+        context.queue.write_buffer(&shared.arguments, 0, arguments);
+    }
+    let submission = context.queue.submit([recorded.finish()]);
+    if shared.interrupt.is_set() { shared.follows(submission) } else { None }
+}
+
+fn encoder(context: &Context, label: &str) -> wgpu::CommandEncoder {
+    context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) })
 }

@@ -11,7 +11,7 @@ pub mod stages;
 use crate::layout;
 pub use film::Film;
 pub use radius::{RadiusSchedule, first_radii};
-pub use stages::{Error, StageTimes, Stages};
+pub use stages::{Error, Interrupt, StageTimes, Stages};
 
 /// Density estimation kernel over t = d/r, each with unit integral over the disc.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -132,71 +132,58 @@ impl Params {
     }
 }
 
+/// Of the pixels of a preview, in either direction, one in so many is searched for its first radius.
+const PREVIEW_STEP: usize = 3;
+
 /// Chooses the first radii, tells the backend and returns them, metres, `[h·w]`. Call before the first [`iterate`].
 pub fn start<S: Stages + ?Sized>(stages: &mut S, params: &Params) -> Result<Vec<f32>, Error> {
-    Ok(start_while(stages, params, || true)?.expect("nothing stops it"))
-}
-
-/// The same as long as `go_on`, which is asked before every stage; none if it stopped.
-pub fn start_while<S: Stages + ?Sized>(
-    stages: &mut S,
-    params: &Params,
-    mut go_on: impl FnMut() -> bool,
-) -> Result<Option<Vec<f32>>, Error> {
-    let [width, height] = params.film_size();
     let radii = match params.radius {
-        FirstRadius::Fixed(r) => vec![r; (width * height) as usize],
-        FirstRadius::Automatic => {
-            let pilot = params.frame(0);
-            if !run(stages, &pilot, &[S::trace_eye, S::trace_photons], &mut go_on)? {
-                return Ok(None);
-            }
-            let (eye, photons) = (stages.eye_vertices()?, stages.photons()?);
-            if !go_on() {
-                return Ok(None);
-            }
-            first_radii(&pilot, &stages.camera(), &eye, &photons)
-        }
+        FirstRadius::Fixed(r) => fixed(params, r),
+        FirstRadius::Automatic => automatic(stages, &params.frame(0), 1)?,
     };
     stages.set_first_radii(&radii)?;
-    Ok(Some(radii))
+    Ok(radii)
+}
+
+/// [`start`] and the first iteration at the price of one iteration: its own photons choose the radii that they are gathered
+/// within, and not every pixel is searched. For a look at the scene, not to be averaged over many: within the distance to
+/// the k-th of them, points of density ρ have the expected density ρ·k/(k−1) (Epanechnikov's kernel, which is 0 for the k-th,
+/// makes up for it).
+pub fn start_preview<S: Stages + ?Sized>(stages: &mut S, params: &Params) -> Result<Vec<f32>, Error> {
+    let frame = params.frame(1);
+    let radii = match params.radius {
+        FirstRadius::Fixed(r) => {
+            stages.trace_eye(&frame)?;
+            stages.trace_photons(&frame)?;
+            fixed(params, r)
+        }
+        FirstRadius::Automatic => automatic(stages, &frame, PREVIEW_STEP)?,
+    };
+    stages.set_first_radii(&radii)?;
+    stages.build_index(&frame)?;
+    stages.gather(&frame)?;
+    stages.accumulate(&frame)?;
+    Ok(radii)
+}
+
+fn fixed(params: &Params, radius: f32) -> Vec<f32> {
+    let [width, height] = params.film_size();
+    vec![radius; width as usize * height as usize]
+}
+
+/// From the eye paths and photons of `frame`, which the stages have afterwards.
+fn automatic<S: Stages + ?Sized>(stages: &mut S, frame: &layout::Frame, step: usize) -> Result<Vec<f32>, Error> {
+    stages.trace_eye(frame)?;
+    stages.trace_photons(frame)?;
+    let (eye, photons) = (stages.eye_vertices()?, stages.photons()?);
+    first_radii(frame, &stages.camera(), &eye, &photons, step, stages.interrupt())
 }
 
 /// One iteration: the algorithm on one screen.
 pub fn iterate<S: Stages + ?Sized>(stages: &mut S, frame: &layout::Frame) -> Result<(), Error> {
-    iterate_while(stages, frame, || true).map(|_| ())
-}
-
-/// The same as long as `go_on`, which is asked before every stage: whether the film has the iteration.
-pub fn iterate_while<S: Stages + ?Sized>(
-    stages: &mut S,
-    frame: &layout::Frame,
-    go_on: impl FnMut() -> bool,
-) -> Result<bool, Error> {
-    let order: [Stage<S>; 5] = [
-        S::trace_eye,     // pixels → EyeVertex[w·h]
-        S::trace_photons, // lights → Photon[n]
-        S::build_index,   // Photon[n] → tree over photons
-        S::gather,        // EyeVertex, tree → radiance[w·h]
-        S::accumulate,    // radiance → film
-    ];
-    run(stages, frame, &order, go_on)
-}
-
-type Stage<S> = fn(&mut S, &layout::Frame) -> Result<(), Error>;
-
-/// Whether it came to the end.
-fn run<S: Stages + ?Sized>(
-    stages: &mut S,
-    frame: &layout::Frame,
-    order: &[Stage<S>],
-    mut go_on: impl FnMut() -> bool,
-) -> Result<bool, Error> {
-    for stage in order {
-        if !go_on() {
-            return Ok(false);
-        }
-        stage(stages, frame)?;
-    }
-    Ok(true)
+    stages.trace_eye(frame)?; // pixels → EyeVertex[w·h]
+    stages.trace_photons(frame)?; // lights → Photon[n]
+    stages.build_index(frame)?; // Photon[n] → tree over photons
+    stages.gather(frame)?; // EyeVertex, tree → radiance[w·h]
+    stages.accumulate(frame) // radiance → film
 }

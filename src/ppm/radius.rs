@@ -3,6 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use crate::device::{Error, Interrupt};
 use crate::index::{Nearest, PointBvh, RadiusSearch};
 use crate::layout::{Camera, EYE_GATHER, EyeVertex, Frame, Photon};
 
@@ -49,13 +50,22 @@ const LEAST_OF_PIXEL: f32 = 0.7;
 
 /// First radius of each film pixel, metres, `[h·w]`: to the tenth nearest photon of a first pass, between a share of the
 /// pixel's footprint and a multiple of the picture's median. Pixels that gather nothing take the median.
-pub fn first_radii(frame: &Frame, camera: &Camera, eye: &[EyeVertex], photons: &[Photon]) -> Vec<f32> {
+///
+/// One pixel of each square of `step` by `step` is searched around for all of them; 1: each for itself.
+pub fn first_radii(
+    frame: &Frame,
+    camera: &Camera,
+    eye: &[EyeVertex],
+    photons: &[Photon],
+    step: usize,
+    interrupt: &Interrupt,
+) -> Result<Vec<f32>, Error> {
     let mut tree = PointBvh::default();
     tree.rebuild(photons.len(), |i| photons[i].position.into());
     let gathers = |v: &EyeVertex| v.flags & EYE_GATHER != 0;
     // A first look at some of the pixels bounds the search for all of them.
-    let step = (eye.len() / 4096).max(1);
-    let sample: Vec<&EyeVertex> = eye.iter().step_by(step).filter(|v| gathers(v)).collect();
+    let every = (eye.len() / 4096).max(1);
+    let sample: Vec<&EyeVertex> = eye.iter().step_by(every).filter(|v| gathers(v)).collect();
     let reach = |v: &EyeVertex, most: f32| {
         let mut nearest = Nearest::new(REACHED);
         tree.nearest(v.position.into(), most, &mut nearest);
@@ -64,23 +74,30 @@ pub fn first_radii(frame: &Frame, camera: &Camera, eye: &[EyeVertex], photons: &
     let mut distances: Vec<f32> = sample.par_iter().filter_map(|v| reach(v, f32::INFINITY)).collect();
     distances.sort_unstable_by(f32::total_cmp);
     let Some(&median) = distances.get(distances.len() / 2) else {
-        return vec![without_photons(frame, camera, eye); eye.len()];
+        return Ok(vec![without_photons(frame, camera, eye); eye.len()]);
     };
     let most = median * MOST_OF_MEDIAN;
     let mut radii = vec![0.0; eye.len()];
-    radii.par_chunks_mut(frame.width as usize).zip(eye.par_chunks(frame.width as usize)).for_each(|(radii, eye)| {
-        // A ball around the pixel to the left, grown by the way from there, holds the same ten photons.
+    let (width, step) = (frame.width as usize, step.max(1));
+    radii.par_chunks_mut(width * step).zip(eye.par_chunks(width * step)).try_for_each(|(radii, eye)| {
+        interrupt.check()?;
+        // A ball around the square to the left, grown by the way from there, holds the same ten photons.
         let mut last: Option<(Vec3, f32)> = None;
-        for (radius, v) in radii.iter_mut().zip(eye).filter(|(_, v)| gathers(v)) {
-            let position = Vec3::from(v.position);
+        for left in (0..width).step_by(step) {
+            let columns = left..(left + step).min(width);
+            let pixels = (0..eye.len()).step_by(width).flat_map(|row| columns.clone().map(move |x| row + x));
+            let mut pixels = pixels.filter(|&i| gathers(&eye[i])).peekable();
+            let Some(&first) = pixels.peek() else { continue };
+            let position = Vec3::from(eye[first].position);
             let bound = last.map_or(most, |(p, r)| most.min((r + p.distance(position)) * (1.0 + 1e-5)));
-            let reached = reach(v, bound).unwrap_or(bound);
+            let reached = reach(&eye[first], bound).unwrap_or(bound);
             last = Some((position, reached));
-            *radius = reached.max(LEAST_OF_PIXEL * footprint(frame, camera, v));
+            pixels.for_each(|i| radii[i] = reached.max(LEAST_OF_PIXEL * footprint(frame, camera, &eye[i])));
         }
-    });
-    fill_gaps(&mut radii, frame.width as usize, median);
-    radii
+        Ok::<_, Error>(())
+    })?;
+    fill_gaps(&mut radii, width, median);
+    Ok(radii)
 }
 
 /// Width of a pixel where its eye path ended, as if that path had been straight; metres.

@@ -1,6 +1,6 @@
 //! Where the CPU and the GPU meet: the stages of an iteration.
 
-pub use crate::device::Error;
+pub use crate::device::{Error, Interrupt};
 use crate::layout::{Camera, EyeVertex, Frame, Photon};
 
 use super::Film;
@@ -30,6 +30,9 @@ impl StageTimes {
 
 /// A backend. Each stage reads what the stages before it left in the backend's memory; the getters read it back, so
 /// that tests compare backends stage by stage.
+///
+/// All stages but [`Stages::accumulate`] can end with [`Error::Interrupted`], within a few milliseconds on a CPU and two
+/// dispatches on a GPU. What they write is then anything; the film is as it was, and goes on with an iteration anew.
 pub trait Stages {
     /// For people.
     fn device(&self) -> String;
@@ -40,6 +43,12 @@ pub trait Stages {
     /// Another camera and film, pixels (width, height), for the same scene: [`super::start`] comes next, and then the film
     /// is that of stages made anew.
     fn set_camera(&mut self, camera: Camera, film_size: [u32; 2]) -> Result<(), Error>;
+
+    /// What ends a stage early from now on.
+    fn set_interrupt(&mut self, interrupt: Interrupt);
+
+    /// What was set.
+    fn interrupt(&self) -> &Interrupt;
 
     /// One eye path per film pixel, to the vertex where photons are gathered; direct light included.
     fn trace_eye(&mut self, frame: &Frame) -> Result<(), Error>;

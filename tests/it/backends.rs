@@ -46,7 +46,7 @@ fn noise_image(name: &str, width: u32, height: u32) -> Image {
 }
 
 /// Every kind of lobe, texture, light and primitive there is.
-fn everything() -> Scene {
+pub fn everything() -> Scene {
     let mut materials = vec![
         Material::diffuse("floor", Vec3::new(0.7, 0.6, 0.5)),
         Material::glass("glass", 1.5),
@@ -326,7 +326,7 @@ fn the_same_seed_gives_the_same_bits_on_the_gpu() {
 }
 
 /// The bits of a film after two iterations.
-fn film_bits(stages: &mut dyn Stages, params: &Params) -> Vec<u32> {
+pub fn film_bits(stages: &mut dyn Stages, params: &Params) -> Vec<u32> {
     start(stages, params).expect("start");
     for i in 1..=2 {
         iterate(stages, &params.frame(i)).expect("iteration");

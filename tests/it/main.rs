@@ -18,6 +18,8 @@ mod index;
 mod indices;
 #[cfg(feature = "render")]
 mod inspect;
+#[cfg(all(feature = "render", feature = "gpu"))]
+mod interrupts;
 mod kd;
 mod layering;
 #[cfg(all(feature = "render", feature = "gpu"))]

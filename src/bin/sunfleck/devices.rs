@@ -186,7 +186,7 @@ impl Device {
         self.stages_of(self.pack(&input.scene, None)?, input, None)
     }
 
-    /// The same with a scene of [`Device::pack`]. A dispatch on a graphics card is to take `dispatch_seconds` at most.
+    /// The same with a scene of [`Device::pack`]. A dispatch on a GPU is to take `dispatch_seconds` at most.
     pub fn stages_of(
         &self,
         scene: Arc<PackedScene>,
@@ -200,7 +200,7 @@ impl Device {
             #[cfg(feature = "gpu")]
             Self::Gpu(context, method) => {
                 let mut stages = GpuStages::with_method(Arc::clone(context), &scene, camera, *method)?;
-                if let Some(seconds) = dispatch_seconds.filter(|_| context.info().is_real()) {
+                if let Some(seconds) = dispatch_seconds {
                     stages.set_dispatch_seconds(seconds);
                 }
                 Box::new(stages)

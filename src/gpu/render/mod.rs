@@ -19,15 +19,17 @@ use super::kernels::{ACCELERATION_STRUCTURE, Access, Batch, Kernel, Modules, Sha
 use super::timer::Timer;
 use crate::device;
 use crate::layout::{Camera, EyeVertex, Frame, Photon, PointBox};
-use crate::ppm::{Error, Film, StageTimes, Stages};
+use crate::ppm::{Error, Film, Interrupt, StageTimes, Stages};
 use crate::scene::PackedScene;
 
 /// Threads a workgroup.
 const THREADS: u32 = 64;
 /// Words of a photon, whose position comes first.
 const PHOTON_WORDS: u32 = (size_of::<Photon>() / 4) as u32;
-/// The film is cut at multiples of this many rows, so that the address of any part of a per-pixel array is aligned.
-const ROW_STEP: u32 = 64;
+/// The film is cut at multiples of this many pixels, so that the address of any part of a per-pixel array is aligned.
+const ALIGNED_PIXELS: u32 = 64;
+/// And at multiples of this many rows: a workgroup's.
+const TILE: u32 = 8;
 /// Pixels of the first dispatches, before anything is known about the device's speed.
 const FIRST_CHUNK: u32 = 65536;
 /// Pixels of the largest dispatches: 112 bytes each have to fit a binding.
@@ -163,7 +165,8 @@ impl GpuStages {
     /// Parts of the film of about `chunk` pixels: first row and number of rows.
     fn chunks(frame: &Frame, chunk: u32) -> impl Iterator<Item = (u32, u32)> + use<> {
         let height = frame.height;
-        let rows = (chunk / frame.width.max(1)).next_multiple_of(ROW_STEP).max(ROW_STEP);
+        let step = (ALIGNED_PIXELS >> frame.width.trailing_zeros().min(ALIGNED_PIXELS.ilog2())).max(TILE);
+        let rows = (chunk / frame.width.max(1)).next_multiple_of(step).max(step);
         (0..height).step_by(rows as usize).map(move |first| (first, rows.min(height - first)))
     }
 
@@ -203,7 +206,7 @@ impl GpuStages {
 
 /// Workgroups for a part of the film.
 fn tiles(width: u32, rows: u32) -> u32 {
-    width.div_ceil(8) * rows.div_ceil(8)
+    width.div_ceil(TILE) * rows.div_ceil(TILE)
 }
 
 /// What can be read back.
@@ -236,7 +239,16 @@ impl Stages for GpuStages {
         self.context.check()
     }
 
+    fn set_interrupt(&mut self, interrupt: Interrupt) {
+        self.shared.interrupt = interrupt;
+    }
+
+    fn interrupt(&self) -> &Interrupt {
+        &self.shared.interrupt
+    }
+
     fn trace_eye(&mut self, frame: &Frame) -> Result<(), Error> {
+        self.shared.interrupt.check()?;
         let n_pixels = frame.width * frame.height;
         self.reserve_pixels(n_pixels)?;
         let mut batch = Batch::new(&self.context, &self.shared, "eye");
@@ -244,8 +256,7 @@ impl Stages for GpuStages {
         self.timer.begin(EYE, &mut batch);
         for (first, rows) in Self::chunks(frame, self.eye_chunk) {
             if first > 0 {
-                batch.submit()?;
-                batch = Batch::new(&self.context, &self.shared, "eye");
+                batch.cut()?;
             }
             let buffers = [self.eye_vertices.range(first * frame.width, rows * frame.width)];
             batch.dispatch(&self.trace_eye, &buffers, [rows, first, 0, 0], tiles(frame.width, rows));
@@ -254,6 +265,7 @@ impl Stages for GpuStages {
     }
 
     fn trace_photons(&mut self, frame: &Frame) -> Result<(), Error> {
+        self.shared.interrupt.check()?;
         self.n_photons = self.paths.trace(
             &self.context,
             &self.shared,
@@ -267,6 +279,7 @@ impl Stages for GpuStages {
     }
 
     fn build_index(&mut self, frame: &Frame) -> Result<(), Error> {
+        self.shared.interrupt.check()?;
         let n = self.n_photons;
         self.photons.reserve(&self.context, u64::from(n))?;
         self.other_photons.reserve(&self.context, self.photons.capacity())?;
@@ -282,10 +295,10 @@ impl Stages for GpuStages {
         self.timer.begin(BUILD, &mut batch);
         let photons = self.photons.all();
         match &mut self.hardware {
-            None => self.index.build(&mut batch, n, &photons, PHOTON_WORDS, &self.other_photons),
+            None => self.index.build(&mut batch, n, &photons, PHOTON_WORDS, &self.other_photons)?,
             Some(hardware) => {
                 if n > 0 {
-                    self.index.sort(&mut batch, n, &photons, PHOTON_WORDS, &self.other_photons);
+                    self.index.sort(&mut batch, n, &photons, PHOTON_WORDS, &self.other_photons)?;
                 }
                 let radius = self.largest_radius.0 * frame.radius_scale;
                 hardware.build(&mut batch, n, &self.other_photons, PHOTON_WORDS, radius);
@@ -297,6 +310,7 @@ impl Stages for GpuStages {
     }
 
     fn gather(&mut self, frame: &Frame) -> Result<(), Error> {
+        self.shared.interrupt.check()?;
         self.check_pixels(frame)?;
         self.photons.reserve(&self.context, 0)?;
         let tree = match &self.hardware {
@@ -314,8 +328,7 @@ impl Stages for GpuStages {
         self.timer.begin(GATHER, &mut batch);
         for (first, rows) in Self::chunks(frame, self.gather_chunk) {
             if first > 0 {
-                batch.submit()?;
-                batch = Batch::new(&self.context, &self.shared, "gather");
+                batch.cut()?;
             }
             let (first, n) = (first * frame.width, rows * frame.width);
             let buffers = [

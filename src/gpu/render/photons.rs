@@ -122,18 +122,19 @@ impl PhotonPaths {
         batch.encoder().clear_buffer(self.counters.raw(), 0, Some(u64::from(4 * N_TOTALS)));
         for first in (0..frame.n_paths).step_by((CHUNK * PATHS) as usize) {
             if first > 0 {
-                batch.submit()?;
-                batch = Batch::new(context, shared, "photons");
+                batch.cut()?;
             }
             let n = (CHUNK * PATHS).min(frame.n_paths - first);
             let groups = n.div_ceil(THREADS * PATHS);
             batch.dispatch(&self.emit, &[self.states.all()], [n, first, 0, 0], n.div_ceil(THREADS));
             for round in 0..self.rounds {
+                if round > 0 {
+                    batch.cut_if_interruptible()?;
+                }
                 let buffers = [self.slots.all(), self.counters.all(), self.states.all()];
                 for group in (0..groups).step_by(self.most_groups as usize) {
                     if group > 0 {
-                        batch.submit()?;
-                        batch = Batch::new(context, shared, "photons");
+                        batch.cut()?;
                     }
                     let part = self.most_groups.min(groups - group);
                     batch.dispatch(&self.trace, &buffers, [n, first, round, group], part);

@@ -164,7 +164,7 @@ impl PointSearch {
         self.index.reserve_sort(&self.context, n)?;
         self.sorted_queries.reserve(&self.context, u64::from(n))?;
         let mut batch = Batch::new(&self.context, &self.shared, "sort queries");
-        self.index.sort(&mut batch, n, &set.records.binding(), set.records.words, &self.sorted_queries);
+        self.index.sort(&mut batch, n, &set.records.binding(), set.records.words, &self.sorted_queries)?;
         batch.submit()?;
         let records = Records { buffer: self.sorted_queries.raw().clone(), n, words: WORDS };
         Ok(QuerySet { records, sorted: true, ..set })

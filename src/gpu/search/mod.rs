@@ -240,10 +240,10 @@ impl PointSearch {
         self.timer.begin(BUILD, &mut batch);
         let n = records.n;
         match &mut self.hardware {
-            None => self.index.build(&mut batch, n, &records.binding(), records.words, &self.points),
+            None => self.index.build(&mut batch, n, &records.binding(), records.words, &self.points)?,
             Some(hardware) => {
                 if n > 0 {
-                    self.index.sort(&mut batch, n, &records.binding(), records.words, &self.points);
+                    self.index.sort(&mut batch, n, &records.binding(), records.words, &self.points)?;
                 }
                 self.max_radius[1] = self.max_radius[0];
                 hardware.build(&mut batch, n, &self.points, WORDS, self.max_radius[1]);

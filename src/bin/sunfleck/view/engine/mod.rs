@@ -14,6 +14,7 @@ mod worker;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
@@ -21,12 +22,14 @@ use anyhow::{Context, Result};
 use glam::Vec3;
 use sunfleck::output::Picture;
 use sunfleck::output::display::Look;
+use sunfleck::ppm::Interrupt;
 use sunfleck::scene::load::Loaded;
 use sunfleck::scene::settings::Settings;
 
 pub use history::{History, Measured, Record, Series};
 pub use paint::{Comparison, Insides, Legend, Painted, Painting, Values, View};
 pub use session::Frame;
+use worker::Work;
 
 use crate::devices::Device;
 use crate::scenes::Source;
@@ -158,6 +161,8 @@ struct Board {
     /// Of a picture that the window can show, pixels.
     most_side: Option<usize>,
     quit: bool,
+    /// Stages under way, and what they are for.
+    work: Option<Work>,
     /// Changes with every restart.
     estimate: u64,
     phase: Phase,
@@ -173,6 +178,11 @@ struct Shared {
     board: Mutex<Board>,
     changed: Condvar,
     wake: Wake,
+    /// Whether nobody wants the work under way any more: asked often, so apart from the lock.
+    is_unwanted: Arc<AtomicBool>,
+    /// How often.
+    #[cfg(test)]
+    asks: Arc<std::sync::atomic::AtomicU32>,
 }
 
 impl Shared {
@@ -194,6 +204,27 @@ impl Shared {
         if self.board().phase != phase {
             self.update(|board| board.phase = phase);
         }
+    }
+
+    /// Ends stages that nobody wants.
+    fn interrupt(&self) -> Interrupt {
+        let is_unwanted = Arc::clone(&self.is_unwanted);
+        #[cfg(test)]
+        let asks = Arc::clone(&self.asks);
+        Interrupt::when(move || {
+            #[cfg(test)]
+            asks.fetch_add(1, Ordering::Relaxed);
+            is_unwanted.load(Ordering::Relaxed)
+        })
+    }
+
+    /// Changes what is wanted, and ends what is not.
+    fn redirect(&self, change: impl FnOnce(&mut Board)) {
+        let mut board = self.board();
+        change(&mut board);
+        let is_unwanted = board.work.as_ref().is_some_and(|work| board.quit || work.is_unwanted(&board.wanted));
+        self.is_unwanted.store(is_unwanted, Ordering::Relaxed);
+        self.changed.notify_all();
     }
 
     /// Notes what nobody needs to look at by itself.
@@ -244,7 +275,14 @@ pub struct Engine {
 impl Engine {
     /// Starts the threads; `wake` is called from them.
     pub fn start(device: Device, wake: Wake) -> std::io::Result<Self> {
-        let shared = Arc::new(Shared { board: Mutex::default(), changed: Condvar::new(), wake });
+        let shared = Arc::new(Shared {
+            board: Mutex::default(),
+            changed: Condvar::new(),
+            wake,
+            is_unwanted: Arc::default(),
+            #[cfg(test)]
+            asks: Arc::default(),
+        });
         let (index, accelerator) = (device.index(), device.accelerator().to_string());
         let named = |name: &str| std::thread::Builder::new().name(name.to_owned());
         let (render, paint) = (Arc::clone(&shared), Arc::clone(&shared));
@@ -267,10 +305,8 @@ impl Engine {
 
     /// Says what is wanted from now on.
     pub fn want(&self, wanted: &Wanted) {
-        let mut board = self.shared.board();
-        if board.wanted != *wanted {
-            board.wanted = wanted.clone();
-            self.shared.changed.notify_all();
+        if self.shared.board().wanted != *wanted {
+            self.shared.redirect(|board| board.wanted = wanted.clone());
         }
     }
 
@@ -346,10 +382,9 @@ impl Engine {
 }
 
 impl Drop for Engine {
-    /// Waits for the stage under way, and for files that are being written.
+    /// Waits for a painting under way, and for files that are being written.
     fn drop(&mut self) {
-        self.shared.board().quit = true;
-        self.shared.changed.notify_all();
+        self.shared.redirect(|board| board.quit = true);
         for thread in self.threads.drain(..) {
             let _ = thread.join();
         }

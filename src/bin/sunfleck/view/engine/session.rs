@@ -7,7 +7,7 @@ use anyhow::Result;
 use sunfleck::inspect::{self, Split};
 use sunfleck::layout::Camera;
 use sunfleck::output::Picture;
-use sunfleck::ppm::{self, Error, Film, Params, Stages};
+use sunfleck::ppm::{self, Error, Film, Interrupt, Params, Stages};
 use sunfleck::scene::PackedScene;
 use sunfleck::scene::settings::Settings;
 
@@ -88,20 +88,24 @@ pub struct Session {
     /// Done in this estimate.
     pub n_iterations: u32,
     pub seconds: f64,
+    /// Whether the stages have what the last iteration left: not if the one after it was interrupted.
+    is_whole: bool,
     shown: Option<Shown>,
 }
 
 impl Session {
-    /// `before` is the same scene with other materials and lights, perhaps.
+    /// `before` is the same scene with other materials and lights, perhaps; `interrupt` ends stages.
     pub fn new(
         device: &Device,
         opened: Arc<Opened>,
         settings: Arc<Settings>,
         input: Input,
         before: Option<&PackedScene>,
+        interrupt: Interrupt,
     ) -> Result<Self> {
         let scene = device.pack(&input.scene, before)?;
-        let stages = device.stages_of(Arc::clone(&scene), &input, Some(DISPATCH_SECONDS))?;
+        let mut stages = device.stages_of(Arc::clone(&scene), &input, Some(DISPATCH_SECONDS))?;
+        stages.set_interrupt(interrupt);
         let params = input.params.clone();
         Ok(Self {
             opened,
@@ -117,6 +121,7 @@ impl Session {
             first_radius: 0.0,
             n_iterations: 0,
             seconds: 0.0,
+            is_whole: false,
             shown: None,
         })
     }
@@ -138,52 +143,60 @@ impl Session {
         let [width, height] = self.params.size;
         self.stages.set_camera(self.input.camera.pack(width, height), self.params.film_size())?;
         (self.estimate, self.is_preview) = (estimate, is_preview);
-        (self.n_iterations, self.seconds, self.shown) = (0, 0.0, None);
+        (self.n_iterations, self.seconds, self.is_whole, self.shown) = (0, 0.0, false, None);
         (self.split, self.radii) = (Split::default(), None);
         Ok(())
     }
 
-    /// The first radii, if there are none yet; whether there are, for `is_stale` may say between two stages that nobody
-    /// wants them any more.
-    pub fn start(&mut self, mut is_stale: impl FnMut() -> bool) -> Result<bool, Error> {
-        if self.radii.is_some() {
-            return Ok(true);
+    /// The first radii, if there are none yet. A preview chooses them with its first iteration.
+    pub fn start(&mut self) -> Result<(), Error> {
+        if self.radii.is_none() && !self.is_preview {
+            let radii = ppm::start(&mut *self.stages, &self.params)?;
+            self.set_radii(radii);
         }
-        let Some(radii) = ppm::start_while(&mut *self.stages, &self.params, || !is_stale())? else {
-            return Ok(false);
-        };
+        Ok(())
+    }
+
+    fn set_radii(&mut self, radii: Vec<f32>) {
         let mut usable: Vec<f32> = radii.iter().copied().filter(|r| *r > 0.0 && r.is_finite()).collect();
         let middle = usable.len() / 2;
         self.first_radius =
             if usable.is_empty() { 0.0 } else { *usable.select_nth_unstable_by(middle, f32::total_cmp).1 };
         self.radii = Some(Arc::new(radii));
-        Ok(true)
     }
 
-    /// One iteration, after [`Session::start`]; none if `is_stale`, as there.
-    pub fn iterate(&mut self, mut is_stale: impl FnMut() -> bool) -> Result<Option<Record>, Error> {
+    /// One iteration, after [`Session::start`].
+    pub fn iterate(&mut self) -> Result<Record, Error> {
         let began = Instant::now();
         let frame = self.params.frame(self.n_iterations + 1);
-        if !ppm::iterate_while(&mut *self.stages, &frame, || !is_stale())? {
-            return Ok(None);
+        self.is_whole = false;
+        if self.radii.is_none() {
+            let radii = ppm::start_preview(&mut *self.stages, &self.params)?;
+            self.set_radii(radii);
+        } else {
+            ppm::iterate(&mut *self.stages, &frame)?;
         }
+        self.is_whole = true;
         let times = self.stages.times()?;
         self.n_iterations += 1;
         self.seconds += began.elapsed().as_secs_f64();
-        Ok(Some(Record {
+        Ok(Record {
             iteration: self.n_iterations,
             seconds: self.seconds,
             radius: self.first_radius * frame.radius_scale,
             times,
             n_photons: self.stages.n_photons(),
             n_paths: self.params.n_paths,
-        }))
+        })
     }
 
     /// Whether something wanted is not in what was shown last.
     pub fn owes(&self, look_inside: bool) -> bool {
         self.n_iterations > 0
-            && self.shown.as_ref().is_none_or(|s| s.n_iterations < self.n_iterations || look_inside && !s.insides)
+            && self
+                .shown
+                .as_ref()
+                .is_none_or(|s| s.n_iterations < self.n_iterations || look_inside && self.is_whole && !s.insides)
     }
 
     /// The film, if it is time to show it, or if there will be no more; with its insides, if `look_inside`.
@@ -195,6 +208,7 @@ impl Session {
             return Ok(None);
         }
         let mut frame = self.frame()?;
+        let look_inside = look_inside && self.is_whole;
         if look_inside {
             frame.insides = Some(Arc::new(self.insides()?));
         }

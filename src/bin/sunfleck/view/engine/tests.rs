@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use sunfleck::cpu::CpuStages;
 use sunfleck::output::exr;
 use sunfleck::ppm::{self, Film, Stages};
-use sunfleck::scene::settings::CameraSettings;
+use sunfleck::scene::settings::{CameraSettings, Count};
 use sunfleck::scene::{Accelerator, PackedScene};
 
 use super::*;
@@ -196,6 +196,64 @@ fn pauses_steps_and_limits_count_exactly() {
     let wakes = bench.wakes.load(Ordering::Relaxed);
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(bench.wakes.load(Ordering::Relaxed), wakes);
+}
+
+/// A first photon pass of seconds: what comes instead does not wait for its end. Counted in chunks of paths.
+#[test]
+fn a_long_stage_is_left_at_once() {
+    const CHUNKS: u32 = 800;
+    let mut bench = Bench::open("cornell", until(1));
+    bench.wait_for_film(&Phase::Reached, 1);
+    let shared = Arc::clone(&bench.engine.shared);
+    let asks = || shared.asks.load(Ordering::Relaxed);
+    // Returns when the photon pass is under way.
+    let lengthen = |bench: &mut Bench| {
+        let before = asks();
+        bench.set(|settings| settings.photons = Some(Count(CHUNKS * 4096)));
+        bench.wait("photons", |now| now.phase == Phase::Starting && asks() > before + 20);
+        before
+    };
+    let is_left_early = |before: u32, what: &str| {
+        let n = asks() - before;
+        assert!(n < CHUNKS / 2, "{what}: {n} of {CHUNKS} chunks were done");
+    };
+
+    // A camera that moves gets its preview, and what was left is taken up again.
+    let before = lengthen(&mut bench);
+    bench.wanted.moving = true;
+    bench.send();
+    bench.wait("a preview", |now| now.frame.as_ref().is_some_and(|frame| frame.is_preview));
+    is_left_early(before, "moving");
+    bench.wanted.moving = false;
+    let before = asks();
+    bench.send();
+    bench.wait("photons", |now| now.phase == Phase::Starting && asks() > before + 20);
+
+    // A setting.
+    bench.set(|settings| settings.photons = Some(Count(2000)));
+    bench.wait_for_film(&Phase::Reached, 1);
+    is_left_early(before, "setting");
+
+    // What changes no pixel does not begin it anew.
+    let before = lengthen(&mut bench);
+    let estimate = bench.engine.now().estimate;
+    bench.wanted.painting.look.exposure = Some(1.0);
+    bench.set(|settings| settings.exposure = Some(1.0));
+    let now = asks();
+    bench.wait("more photons", |_| asks() > now + 20);
+    assert_eq!(bench.engine.now().estimate, estimate);
+
+    // Another scene, none, and the end of it all.
+    let choice = bench.wanted.scene.take();
+    bench.send();
+    bench.wait_for(&Phase::Empty);
+    is_left_early(before, "closing");
+    (bench.wanted.scene, bench.wanted.settings) = (choice, None);
+    bench.send();
+    bench.wait_for_film(&Phase::Reached, 1);
+    let before = lengthen(&mut bench);
+    drop(bench);
+    is_left_early(before, "quitting");
 }
 
 #[test]

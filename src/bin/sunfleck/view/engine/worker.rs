@@ -6,6 +6,7 @@ use std::thread::JoinHandle;
 
 use anyhow::{Context, Result};
 use sunfleck::output;
+use sunfleck::ppm::Error;
 use sunfleck::scene::settings::Settings;
 
 use super::session::{Frame, Session};
@@ -23,6 +24,21 @@ struct Have {
     estimate: u64,
     steps_done: u32,
     writers: Vec<JoinHandle<()>>,
+}
+
+/// What stages under way are for.
+pub struct Work {
+    wanted: Wanted,
+    opened: Arc<Opened>,
+    /// To the end, unless the scene is left.
+    keep_on: bool,
+}
+
+impl Work {
+    /// Whether what is wanted `now` makes it pointless.
+    pub fn is_unwanted(&self, now: &Wanted) -> bool {
+        is_other_scene(&self.wanted, now) || !self.keep_on && is_other_estimate(&self.opened, &self.wanted, now)
+    }
 }
 
 /// Until the interface is gone.
@@ -65,21 +81,12 @@ impl Board {
 impl Have {
     /// Whether what is wanted calls for more than going on.
     fn is_behind(&self, wanted: &Wanted) -> bool {
-        (&self.wanted.scene, self.wanted.reloads) != (&wanted.scene, wanted.reloads)
-            || self.wanted.retries != wanted.retries
-            || self.is_stale(wanted)
+        is_other_scene(&self.wanted, wanted) || self.wanted.retries != wanted.retries || self.is_stale(wanted)
     }
 
     /// Whether the estimate under way is not the one wanted.
     fn is_stale(&self, wanted: &Wanted) -> bool {
-        self.opened.is_some()
-            && (self.wanted.moving != wanted.moving
-                || self.wanted.restarts != wanted.restarts
-                || self.rendered(&self.wanted) != self.rendered(wanted))
-    }
-
-    fn rendered(&self, wanted: &Wanted) -> Option<Settings> {
-        self.opened.as_ref().map(|opened| rendered(opened, wanted))
+        self.opened.as_ref().is_some_and(|opened| is_other_estimate(opened, &self.wanted, wanted))
     }
 
     fn can_go_on(&self, wanted: &Wanted, noise: Option<f64>) -> bool {
@@ -103,8 +110,7 @@ impl Have {
     /// Does one thing that leads towards what is wanted.
     fn follow(&mut self, shared: &Shared, device: &mut Device, wanted: &Wanted) -> Result<()> {
         let is_retry = self.wanted.retries != wanted.retries && self.session.is_none() && wanted.scene.is_some();
-        let is_other_scene = (&self.wanted.scene, self.wanted.reloads) != (&wanted.scene, wanted.reloads)
-            || is_retry && self.opened.is_none();
+        let is_other_scene = is_other_scene(&self.wanted, wanted) || is_retry && self.opened.is_none();
         let is_stale = self.is_stale(wanted);
         let before = std::mem::replace(&mut self.wanted, wanted.clone());
         if is_retry && device.is_lost() {
@@ -129,7 +135,8 @@ impl Have {
             return self.prepare(shared, device, wanted);
         }
         if is_stale || is_retry {
-            return match self.rendered(&before) == self.rendered(wanted) && self.session.is_some() {
+            let same = self.opened.as_ref().is_some_and(|opened| is_rendered_alike(opened, &before, wanted));
+            return match same && self.session.is_some() {
                 true => self.restart(shared, wanted),
                 false => self.prepare(shared, device, wanted),
             };
@@ -158,7 +165,8 @@ impl Have {
                 shared.update(|board| board.phase = Phase::Preparing);
                 let before = self.session.take().map(Session::into_scene); // Its memory first.
                 let warnings: Vec<_> = input.warnings.iter().cloned().map(Message::Warning).collect();
-                let session = Session::new(device, opened, Arc::new(settings), input, before.as_deref())?;
+                let (settings, interrupt) = (Arc::new(settings), shared.interrupt());
+                let session = Session::new(device, opened, settings, input, before.as_deref(), interrupt)?;
                 shared.update(|board| {
                     board.messages.extend(warnings);
                     board.device = session.device();
@@ -184,23 +192,22 @@ impl Have {
 
     fn iterate(&mut self, shared: &Shared, wanted: &Wanted) -> Result<()> {
         let Some(session) = &mut self.session else { return Ok(()) };
-        let opened = Arc::clone(&session.opened);
-        // The first picture of a preview is always shown, or a camera that keeps moving would show none.
-        let keep_on = wanted.moving && session.n_iterations == 0;
-        let is_stale = || {
-            let board = shared.board();
-            let now = &board.wanted;
-            board.quit
-                || (&wanted.scene, wanted.reloads) != (&now.scene, now.reloads)
-                || !keep_on
-                    && ((wanted.moving, wanted.restarts) != (now.moving, now.restarts)
-                        || rendered(&opened, wanted) != rendered(&opened, now))
+        let work = Work {
+            wanted: wanted.clone(),
+            opened: Arc::clone(&session.opened),
+            // The first picture of a preview is always shown, or a camera that keeps moving would show none.
+            keep_on: wanted.moving && session.n_iterations == 0,
         };
-        if !session.start(is_stale)? {
-            return Ok(());
-        }
-        shared.enter(Phase::Rendering);
-        let Some(record) = session.iterate(is_stale)? else { return Ok(()) };
+        shared.redirect(|board| board.work = Some(work));
+        let done = session.start().and_then(|()| {
+            shared.enter(Phase::Rendering);
+            session.iterate()
+        });
+        shared.redirect(|board| board.work = None);
+        let record = match done {
+            Err(Error::Interrupted) => return Ok(()),
+            done => done?,
+        };
         if wanted.paused {
             self.steps_done = (self.steps_done + 1).min(wanted.steps);
         }
@@ -226,6 +233,7 @@ impl Have {
     fn fail(&mut self, shared: &Shared, text: String) {
         self.session = None;
         shared.update(|board| {
+            board.work = None;
             board.messages.push(Message::Error(text.clone()));
             board.phase = Phase::Failed(text);
         });
@@ -263,6 +271,24 @@ fn open(choice: &Arc<Choice>) -> Result<Opened> {
     source.set(&choice.set)?;
     let loaded = source.scene()?;
     Ok(Opened { choice: Arc::clone(choice), source, read, loaded })
+}
+
+fn is_other_scene(before: &Wanted, now: &Wanted) -> bool {
+    (&before.scene, before.reloads) != (&now.scene, now.reloads)
+}
+
+/// Whether the estimate that was wanted before is not the one wanted now, of the same scene.
+fn is_other_estimate(opened: &Opened, before: &Wanted, now: &Wanted) -> bool {
+    (before.moving, before.restarts) != (now.moving, now.restarts) || !is_rendered_alike(opened, before, now)
+}
+
+/// Whether the settings leave the estimate as it is. Quick where they are the same.
+fn is_rendered_alike(opened: &Opened, before: &Wanted, now: &Wanted) -> bool {
+    let is_same = match (&before.settings, &now.settings) {
+        (Some(before), Some(now)) => Arc::ptr_eq(before, now),
+        (before, now) => before.is_none() && now.is_none(),
+    };
+    is_same || rendered(opened, before) == rendered(opened, now)
 }
 
 /// Those settings that the estimate depends on.
