@@ -21,6 +21,28 @@ pub enum Device {
     Gpu(Arc<Context>, Method),
 }
 
+/// How an open device searches.
+#[cfg(feature = "view")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Search {
+    /// What finds photons; a CPU has but its tree.
+    pub index: Method,
+    /// What finds what a ray meets; a GPU has but its BVH.
+    pub accelerator: Accelerator,
+}
+
+#[cfg(feature = "view")]
+impl Search {
+    /// The command line's flags for what is not the default, each after a space.
+    pub fn flags(&self) -> &'static str {
+        match (self.index, self.accelerator) {
+            (Method::Hardware, _) => " --index hardware",
+            (Method::Tree, Accelerator::Kd) => " --accel kd",
+            (Method::Tree, Accelerator::Bvh) => "",
+        }
+    }
+}
+
 /// Limits the CPU's threads.
 pub fn use_threads(threads: Option<u16>) -> Result<()> {
     let builder = rayon::ThreadPoolBuilder::new().num_threads(threads.map_or(0, usize::from));
@@ -147,18 +169,41 @@ impl Device {
         }
     }
 
-    /// The same adapter, opened once more.
+    /// How it searches.
     #[cfg(feature = "view")]
-    pub fn reopen(&self) -> Result<Self> {
+    pub fn search(&self) -> Search {
+        match self {
+            Self::Cpu(accelerator) => Search { accelerator: *accelerator, ..Search::default() },
+            Self::Gpu(_, method) => Search { index: *method, ..Search::default() },
+        }
+    }
+
+    /// All ways in which it can search, the default first.
+    #[cfg(feature = "view")]
+    pub fn searches(&self) -> Vec<Search> {
+        let mut all = vec![Search::default()];
+        match self {
+            Self::Cpu(_) => all.push(Search { accelerator: Accelerator::Kd, ..Search::default() }),
+            Self::Gpu(context, _) if context.info().ray_queries => {
+                all.push(Search { index: Method::Hardware, ..Search::default() });
+            }
+            Self::Gpu(..) => {}
+        }
+        all
+    }
+
+    /// The same adapter, opened once more, to search so.
+    #[cfg(feature = "view")]
+    pub fn reopen(&self, search: Search) -> Result<Self> {
         Ok(match self {
-            Self::Cpu(accelerator) => Self::Cpu(*accelerator),
-            Self::Gpu(context, method) => {
+            Self::Cpu(_) => Self::Cpu(search.accelerator),
+            Self::Gpu(context, _) => {
                 let choice = Choice::Index(context.info().index);
-                let context = match method {
+                let context = match search.index {
                     Method::Tree => Context::new(&choice)?,
                     Method::Hardware => Context::with_ray_queries(&choice)?,
                 };
-                Self::Gpu(Arc::new(context), *method)
+                Self::Gpu(Arc::new(context), search.index)
             }
         })
     }

@@ -15,6 +15,7 @@ use super::files;
 use super::picture::PictureView;
 use super::state::{Edits, Remembered};
 use crate::cli::{Usage, ViewArgs};
+use crate::devices::Search;
 use crate::scenes::Source;
 
 /// Key of what is remembered.
@@ -95,12 +96,12 @@ pub struct Viewer {
 impl Viewer {
     pub fn new(engine: Engine, wake: Wake, first: First) -> Self {
         let wanted = Wanted { scene: first.choice.map(Arc::new), limits: first.limits, ..Wanted::default() };
-        let now = engine.now();
+        let (now, search) = (engine.now(), engine.search());
         Self {
             engine,
             wanted,
             now,
-            edits: Edits::default(),
+            edits: Edits::new(Settings::default(), search),
             remembered: Remembered::default(),
             entered: false,
             picture: PictureView::default(),
@@ -209,7 +210,14 @@ impl Viewer {
         self.use_edits();
     }
 
+    /// Searches otherwise, from now on.
+    pub fn search_by(&mut self, search: Search) {
+        self.edits.set_search(search);
+        self.use_edits();
+    }
+
     fn use_edits(&mut self) {
+        self.wanted.search = Some(self.edits.search());
         self.wanted.settings = self.editing.as_ref().map(|_| Arc::clone(self.edits.now()));
     }
 
@@ -252,7 +260,7 @@ impl Viewer {
     pub fn command(&self) -> Option<String> {
         let opened = self.editing.as_ref()?;
         let iterations = self.now.frame.as_ref().map_or(1, |frame| frame.film.n_iterations);
-        Some(opened.command(self.edits.now(), iterations, Path::new("picture.exr")))
+        Some(opened.command(self.edits.now(), self.edits.search(), iterations, Path::new("picture.exr")))
     }
 
     /// What is open.
@@ -379,7 +387,7 @@ impl Viewer {
             if let Some(opened) = &self.editing {
                 self.remembered.opened(&opened.source.name);
                 if !is_reload {
-                    self.edits = Edits::new(opened.source.settings.clone());
+                    self.edits = Edits::new(opened.source.settings.clone(), self.edits.search());
                     self.wanted.painting.look.exposure = opened.source.settings.exposure;
                     self.picture = PictureView::default();
                 }

@@ -7,17 +7,26 @@ use serde::{Deserialize, Serialize};
 use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::settings::Settings;
 
+use crate::devices::Search;
+
 /// Files that are remembered.
 const MOST_RECENT: usize = 12;
 /// Steps that can be undone.
 const MOST_UNDONE: usize = 256;
 
+/// What can be edited.
+#[derive(Clone, Debug, Default)]
+struct Edited {
+    settings: Arc<Settings>,
+    search: Search,
+}
+
 /// Settings, and how to go back to what they were.
 #[derive(Clone, Debug, Default)]
 pub struct Edits {
-    now: Arc<Settings>,
-    undo: Vec<Arc<Settings>>,
-    redo: Vec<Arc<Settings>>,
+    now: Edited,
+    undo: Vec<Edited>,
+    redo: Vec<Edited>,
     /// What the last edit was of, and when: a drag is one step.
     last: Option<(&'static str, f64)>,
 }
@@ -26,29 +35,48 @@ impl Edits {
     /// Edits of the same thing within so many seconds are one step.
     const ONE_STEP: f64 = 0.7;
 
-    pub fn new(settings: Settings) -> Self {
-        Self { now: Arc::new(settings), ..Self::default() }
+    pub fn new(settings: Settings, search: Search) -> Self {
+        Self { now: Edited { settings: Arc::new(settings), search }, ..Self::default() }
     }
 
     pub fn now(&self) -> &Arc<Settings> {
-        &self.now
+        &self.now.settings
+    }
+
+    pub fn search(&self) -> Search {
+        self.now.search
+    }
+
+    /// Searches otherwise: a step of its own.
+    pub fn set_search(&mut self, search: Search) {
+        if search != self.now.search {
+            self.push(Edited { search, ..self.now.clone() });
+            self.last = None;
+        }
+    }
+
+    fn push(&mut self, edited: Edited) {
+        self.undo.push(std::mem::replace(&mut self.now, edited));
+        if self.undo.len() > MOST_UNDONE {
+            self.undo.remove(0);
+        }
+        self.redo.clear();
     }
 
     /// Replaces the settings; `what` is edited at `time`, seconds.
     pub fn set(&mut self, what: &'static str, time: f64, settings: Settings) {
-        if settings == *self.now {
+        if settings == *self.now.settings {
             return;
         }
+        let edited = Edited { settings: Arc::new(settings), search: self.now.search };
         let goes_on = self.last.is_some_and(|(last, when)| last == what && time - when < Self::ONE_STEP);
-        if !goes_on {
-            self.undo.push(Arc::clone(&self.now));
-            if self.undo.len() > MOST_UNDONE {
-                self.undo.remove(0);
-            }
+        if goes_on {
+            self.redo.clear();
+            self.now = edited;
+        } else {
+            self.push(edited);
         }
-        self.redo.clear();
         self.last = Some((what, time));
-        self.now = Arc::new(settings);
     }
 
     /// The next edit is a step of its own, whatever it is of.
@@ -65,15 +93,15 @@ impl Edits {
     }
 
     pub fn undo(&mut self) {
-        if let Some(settings) = self.undo.pop() {
-            self.redo.push(std::mem::replace(&mut self.now, settings));
+        if let Some(before) = self.undo.pop() {
+            self.redo.push(std::mem::replace(&mut self.now, before));
             self.last = None;
         }
     }
 
     pub fn redo(&mut self) {
-        if let Some(settings) = self.redo.pop() {
-            self.undo.push(std::mem::replace(&mut self.now, settings));
+        if let Some(after) = self.redo.pop() {
+            self.undo.push(std::mem::replace(&mut self.now, after));
             self.last = None;
         }
     }
@@ -125,7 +153,7 @@ mod tests {
 
     #[test]
     fn a_drag_is_one_step() {
-        let mut edits = Edits::new(with_alpha(0.1));
+        let mut edits = Edits::new(with_alpha(0.1), Search::default());
         for i in 0..10 {
             edits.set("alpha", 0.1 * f64::from(i), with_alpha(0.2 + 0.01 * i as f32));
         }

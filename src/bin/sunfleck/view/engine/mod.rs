@@ -31,7 +31,7 @@ pub use paint::{Comparison, Insides, Legend, Painted, Painting, Values, View};
 pub use session::Frame;
 use worker::Work;
 
-use crate::devices::Device;
+use crate::devices::{Device, Search};
 use crate::scenes::Source;
 
 /// Called when there is something new to look at.
@@ -63,6 +63,8 @@ pub struct Wanted {
     pub reloads: u32,
     /// In the place of those that the scene was opened with.
     pub settings: Option<Arc<Settings>>,
+    /// In the place of how the device was opened to search.
+    pub search: Option<Search>,
     /// The camera is moving: quick previews instead of the picture.
     pub moving: bool,
     /// Counts restarts.
@@ -117,14 +119,14 @@ impl Opened {
         self.loaded.scene.bounds().into_iter().chain(spheres).reduce(union).unwrap_or([-0.5, 0.5].map(Vec3::splat))
     }
 
-    /// What renders this scene with `settings` on the command line.
-    pub fn command(&self, settings: &Settings, iterations: u32, output: &Path) -> String {
+    /// What renders this scene with `settings` on the command line, searching so.
+    pub fn command(&self, settings: &Settings, search: Search, iterations: u32, output: &Path) -> String {
         let mut command = format!("sunfleck render {}", crate::render::quote(&self.source.name));
         for pair in settings.difference(&self.read) {
             command += &format!(" --set {}", crate::render::quote(&pair));
         }
         let output = crate::render::quote(&output.to_string_lossy());
-        format!("{command} --iterations {} -o {output}", iterations.max(1))
+        format!("{command}{} --iterations {} -o {output}", search.flags(), iterations.max(1))
     }
 }
 
@@ -265,10 +267,8 @@ pub struct Now {
 /// The interface's end.
 pub struct Engine {
     shared: Arc<Shared>,
-    /// What searches the photons: `tree` or `hardware`.
-    index: String,
-    /// What finds what a ray meets: `bvh` or `kd`.
-    accelerator: String,
+    search: Search,
+    searches: Vec<Search>,
     threads: Vec<JoinHandle<()>>,
 }
 
@@ -283,24 +283,24 @@ impl Engine {
             #[cfg(test)]
             asks: Arc::default(),
         });
-        let (index, accelerator) = (device.index(), device.accelerator().to_string());
+        let (search, searches) = (device.search(), device.searches());
         let named = |name: &str| std::thread::Builder::new().name(name.to_owned());
         let (render, paint) = (Arc::clone(&shared), Arc::clone(&shared));
         let threads = vec![
             named("render").spawn(move || worker::run(&render, device))?,
             named("paint").spawn(move || painting::run(&paint))?,
         ];
-        Ok(Self { shared, index, accelerator, threads })
+        Ok(Self { shared, search, searches, threads })
     }
 
-    /// What searches the photons: `tree` or `hardware`.
-    pub fn index(&self) -> &str {
-        &self.index
+    /// How the device searched when the engine was started.
+    pub fn search(&self) -> Search {
+        self.search
     }
 
-    /// What finds what a ray meets: `bvh` or `kd`.
-    pub fn accelerator(&self) -> &str {
-        &self.accelerator
+    /// All ways in which it can.
+    pub fn searches(&self) -> &[Search] {
+        &self.searches
     }
 
     /// Says what is wanted from now on.

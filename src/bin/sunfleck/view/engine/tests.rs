@@ -335,6 +335,43 @@ fn a_lost_device_is_opened_again() {
     bench.wait_for_film(&Phase::Reached, 4);
 }
 
+/// Opens the scene on `device`, has it searched in the other way, and returns both films.
+fn searched_in_both_ways(device: Device) -> [Film; 2] {
+    let mut bench = Bench::open_on(device, "cornell", until(2));
+    let before = bench.wait_for_film(&Phase::Reached, 2);
+    let [first, other] = bench.engine.searches()[..] else { panic!("{:?}", bench.engine.searches()) };
+    assert_eq!(bench.engine.search(), first);
+    bench.wanted.search = Some(other);
+    bench.send();
+    let after = bench.wait("another estimate", |now| {
+        now.estimate > before.estimate && now.phase == Phase::Reached && iterations(now) == Some(2)
+    });
+    let frame = after.frame.unwrap();
+    let command = frame.opened.command(&frame.settings, frame.search, 2, Path::new("a.exr"));
+    assert!(command.contains(other.flags()) && !other.flags().is_empty(), "{command}");
+    [before.frame.unwrap(), frame].map(|frame| frame.film.as_ref().clone())
+}
+
+#[test]
+fn another_way_to_search_finds_the_same_picture() {
+    let [bvh, kd] = searched_in_both_ways(Device::Cpu(Accelerator::Bvh));
+    assert_eq!(bvh.pixels, kd.pixels);
+}
+
+#[test]
+fn ray_queries_find_the_same_picture() {
+    let device = crate::devices::open_backend("gpu").ok().filter(|device| device.searches().len() > 1);
+    let Some(device) = device else {
+        let required = std::env::var_os("SUNFLECK_REQUIRE_RAY_QUERY").is_some();
+        assert!(!required, "SUNFLECK_REQUIRE_RAY_QUERY is set, but there are none");
+        return;
+    };
+    let [tree, hardware] = searched_in_both_ways(device).map(|film| film.rgb());
+    let sum = |of: &[[f32; 3]]| of.as_flattened().iter().map(|x| f64::from(x.abs())).sum::<f64>();
+    let apart: Vec<[f32; 3]> = tree.iter().zip(&hardware).map(|(a, b)| [0, 1, 2].map(|i| a[i] - b[i])).collect();
+    assert!(sum(&apart) < 1e-5 * sum(&tree), "{} of {}", sum(&apart), sum(&tree));
+}
+
 #[test]
 fn a_panic_is_an_error() {
     assert_eq!(catch(|| 3), Ok(3));

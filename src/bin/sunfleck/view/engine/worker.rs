@@ -114,7 +114,13 @@ impl Have {
         let is_stale = self.is_stale(wanted);
         let before = std::mem::replace(&mut self.wanted, wanted.clone());
         if is_retry && device.is_lost() {
-            *device = device.reopen()?;
+            *device = device.reopen(device.search())?;
+        }
+        let search = wanted.search.unwrap_or_else(|| device.search());
+        if device.search() != search && (is_retry || is_other_scene || before.search != wanted.search) {
+            // The memory of the old one first.
+            self.session = None;
+            *device = device.reopen(search)?;
         }
         if is_other_scene {
             // The memory of the old one first.
@@ -279,7 +285,8 @@ fn is_other_scene(before: &Wanted, now: &Wanted) -> bool {
 
 /// Whether the estimate that was wanted before is not the one wanted now, of the same scene.
 fn is_other_estimate(opened: &Opened, before: &Wanted, now: &Wanted) -> bool {
-    (before.moving, before.restarts) != (now.moving, now.restarts) || !is_rendered_alike(opened, before, now)
+    (before.moving, before.restarts, before.search) != (now.moving, now.restarts, now.search)
+        || !is_rendered_alike(opened, before, now)
 }
 
 /// Whether the settings leave the estimate as it is. Quick where they are the same.
@@ -324,7 +331,7 @@ pub fn write(save: &Save, frame: &Frame, adapter: String) -> Result<u32> {
     } else {
         let header = output::exr::Header {
             scene: frame.opened.source.name.clone(),
-            command: frame.opened.command(&frame.settings, film.n_iterations, &save.path),
+            command: frame.opened.command(&frame.settings, frame.search, film.n_iterations, &save.path),
             adapter,
             seed: params.seed,
             alpha: params.alpha,

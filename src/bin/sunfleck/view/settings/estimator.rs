@@ -2,10 +2,13 @@
 
 use eframe::egui;
 use egui::Ui;
+use sunfleck::gpu::Method;
 use sunfleck::ppm::Params;
+use sunfleck::scene::Accelerator;
 use sunfleck::scene::settings::{Count, Direct, FirstRadius, Kernel, Settings};
 
 use super::widgets::{Name, choice, count_of, count_text, metres, rounded, row, slider};
+use crate::devices::Search;
 use crate::view::app::Viewer;
 
 const PHOTONS: Name = Name {
@@ -37,13 +40,11 @@ const SEED: Name =
     Name { name: "Seed", hint: "Another seed, other noise; the same seed, the same picture. Restarts the estimate." };
 const INDEX: Name = Name {
     name: "Index",
-    hint: "What finds the photons near a point: sunfleck's own tree, or the ray tracing hardware of a graphics card. \
-           Chosen at the start: sunfleck view --index tree|hardware.",
+    hint: "What finds the photons near a point: a GPU with ray queries has a choice. Restarts the estimate.",
 };
 const ACCELERATOR: Name = Name {
     name: "Accelerator",
-    hint: "What finds the surface a ray meets: a tree of boxes (bvh), or of planes (kd, on the CPU). The picture is the same. \
-           Chosen at the start: sunfleck view --accel bvh|kd.",
+    hint: "What finds the surface a ray meets: the CPU has a choice. The picture is the same. Restarts the estimate.",
 };
 
 pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
@@ -123,14 +124,58 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
 
     numbers(ui, viewer, read, now);
 
-    row(ui, INDEX, false, |ui| {
-        let text = match viewer.engine().index() {
-            "hardware" => "hardware (ray queries)",
-            other => other,
-        };
-        ui.add(egui::Label::new(text).truncate())
+    let search = viewer.edits.search();
+    by(
+        ui,
+        viewer,
+        INDEX,
+        &mut |index| Search { index, ..search },
+        |search| search.index,
+        |index| match index {
+            Method::Tree => ("Tree", "Sunfleck's own tree over the photons."),
+            Method::Hardware => ("Ray queries", "The ray tracing hardware of the graphics card."),
+        },
+    );
+    by(
+        ui,
+        viewer,
+        ACCELERATOR,
+        &mut |accelerator| Search { accelerator, ..search },
+        |search| search.accelerator,
+        |accelerator| match accelerator {
+            Accelerator::Bvh => ("Boxes (bvh)", "A bounding volume hierarchy."),
+            Accelerator::Kd => ("Planes (kd)", "A kd-tree."),
+        },
+    );
+}
+
+/// One of the ways to search that the device has; back is the way it was opened with.
+fn by<T: Copy + PartialEq>(
+    ui: &mut Ui,
+    viewer: &mut Viewer,
+    name: Name,
+    with: &mut dyn FnMut(T) -> Search,
+    part: fn(&Search) -> T,
+    words: fn(T) -> (&'static str, &'static str),
+) {
+    let all: Vec<_> = viewer.engine().searches().iter().map(part).fold(vec![], |mut all, one| {
+        if !all.contains(&one) {
+            all.push(one);
+        }
+        all
     });
-    row(ui, ACCELERATOR, false, |ui| ui.add(egui::Label::new(viewer.engine().accelerator()).truncate()));
+    let all: Vec<_> = all.into_iter().map(|one| (one, words(one).0, words(one).1)).collect();
+    let (was, now) = (part(&viewer.engine().search()), part(&viewer.edits.search()));
+    let mut chosen = now;
+    let reset = row(ui, name, now != was, |ui| {
+        ui.add_enabled_ui(all.len() > 1, |ui| choice(ui, name.name, &mut chosen, &all)).inner
+    });
+    if reset {
+        chosen = was;
+    }
+    if chosen != now {
+        viewer.search_by(with(chosen));
+    }
 }
 
 fn radius(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, now: &Settings) {
