@@ -147,8 +147,8 @@ pub fn start<S: Stages + ?Sized>(stages: &mut S, params: &Params) -> Result<Vec<
 
 /// [`start`] and the first iteration at the price of one iteration: its own photons choose the radii that they are gathered
 /// within, and not every pixel is searched. For a look at the scene, not to be averaged over many: within the distance to
-/// the k-th of them, points of density ρ have the expected density ρ·k/(k−1) (Epanechnikov's kernel, which is 0 for the k-th,
-/// makes up for it).
+/// the k-th of them, points of density ρ have the expected density ρ·k/(k−1). Epanechnikov's kernel, which is 0 for the k-th,
+/// makes up for it; the constant one is made a little narrower, so that the k-th is left out.
 pub fn start_preview<S: Stages + ?Sized>(stages: &mut S, params: &Params) -> Result<Vec<f32>, Error> {
     let frame = params.frame(1);
     let radii = match params.radius {
@@ -157,7 +157,13 @@ pub fn start_preview<S: Stages + ?Sized>(stages: &mut S, params: &Params) -> Res
             stages.trace_photons(&frame)?;
             fixed(params, r)
         }
-        FirstRadius::Automatic => automatic(stages, &frame, PREVIEW_STEP)?,
+        FirstRadius::Automatic => {
+            let mut radii = automatic(stages, &frame, PREVIEW_STEP)?;
+            if params.kernel == Kernel::Constant {
+                radii.iter_mut().for_each(|radius| *radius *= 1.0 - 1e-4);
+            }
+            radii
+        }
     };
     stages.set_first_radii(&radii)?;
     stages.build_index(&frame)?;

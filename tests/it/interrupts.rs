@@ -167,21 +167,22 @@ fn a_preview_is_as_bright_as_the_picture() {
         let rgb = stages.film().expect("film").rgb();
         rgb.iter().flatten().map(|&c| f64::from(c)).sum::<f64>() / (3 * rgb.len()) as f64
     };
-    let (mut previews, mut pictures) = (0.0, 0.0);
-    for seed in 0..8 {
-        let params = Params { seed, n_paths: 20_000, direct: Direct::Photons, ..params() };
-        assert_eq!(params.kernel, Kernel::Epanechnikov);
-        let coarse = ppm::start_preview(&mut stages, &params).expect("preview");
-        previews += mean(&mut stages);
-        stages.set_camera(stages.camera(), SIZE).expect("room");
-        let fine = ppm::start(&mut stages, &params).expect("start");
-        ppm::iterate(&mut stages, &params.frame(1)).expect("iteration");
-        pictures += mean(&mut stages);
-        stages.set_camera(stages.camera(), SIZE).expect("room");
-        let [coarse, fine] = [coarse, fine].map(|radii| radii.iter().map(|r| f64::from(r.ln())).sum::<f64>());
-        let ratio = ((coarse - fine) / f64::from(SIZE[0] * SIZE[1])).exp();
-        assert!((0.95..1.05).contains(&ratio), "seed {seed}: radii {ratio} times as large");
+    for kernel in [Kernel::Epanechnikov, Kernel::Constant] {
+        let (mut previews, mut pictures) = (0.0, 0.0);
+        for seed in 0..8 {
+            let params = Params { seed, n_paths: 20_000, direct: Direct::Photons, kernel, ..params() };
+            let coarse = ppm::start_preview(&mut stages, &params).expect("preview");
+            previews += mean(&mut stages);
+            stages.set_camera(stages.camera(), SIZE).expect("room");
+            let fine = ppm::start(&mut stages, &params).expect("start");
+            ppm::iterate(&mut stages, &params.frame(1)).expect("iteration");
+            pictures += mean(&mut stages);
+            stages.set_camera(stages.camera(), SIZE).expect("room");
+            let [coarse, fine] = [coarse, fine].map(|radii| radii.iter().map(|r| f64::from(r.ln())).sum::<f64>());
+            let ratio = ((coarse - fine) / f64::from(SIZE[0] * SIZE[1])).exp();
+            assert!((0.95..1.05).contains(&ratio), "seed {seed}: radii {ratio} times as large");
+        }
+        println!("{kernel:?}: brightness {}", previews / pictures);
+        assert!((previews / pictures - 1.0).abs() < 0.03, "{kernel:?}: {previews} against {pictures}");
     }
-    println!("brightness {}", previews / pictures);
-    assert!((previews / pictures - 1.0).abs() < 0.03, "{previews} against {pictures}");
 }

@@ -201,24 +201,25 @@ impl Viewer {
     }
 
     pub fn undo(&mut self) {
-        self.edits.undo();
-        self.use_edits();
+        self.change_edits(Edits::undo);
     }
 
     pub fn redo(&mut self) {
-        self.edits.redo();
-        self.use_edits();
+        self.change_edits(Edits::redo);
     }
 
     /// Searches otherwise, from now on.
     pub fn search_by(&mut self, search: Search) {
-        self.edits.set_search(search);
-        self.use_edits();
+        self.change_edits(|edits| edits.set_search(search));
     }
 
-    fn use_edits(&mut self) {
-        self.wanted.search = Some(self.edits.search());
-        self.wanted.settings = self.editing.as_ref().map(|_| Arc::clone(self.edits.now()));
+    /// Not while a scene is being read: the settings are those of no other.
+    fn change_edits(&mut self, change: impl FnOnce(&mut Edits)) {
+        if self.editing.is_some() {
+            change(&mut self.edits);
+            (self.wanted.search, self.wanted.settings) =
+                (Some(self.edits.search()), Some(Arc::clone(self.edits.now())));
+        }
     }
 
     /// Brightens the picture by so many stops.

@@ -240,7 +240,6 @@ impl Have {
         self.session = None;
         shared.update(|board| {
             board.work = None;
-            board.messages.push(Message::Error(text.clone()));
             board.phase = Phase::Failed(text);
         });
     }
