@@ -95,8 +95,8 @@ pub struct Viewer {
 
 impl Viewer {
     pub fn new(engine: Engine, wake: Wake, first: First) -> Self {
-        let wanted = Wanted { scene: first.choice.map(Arc::new), limits: first.limits, ..Wanted::default() };
         let (now, search) = (engine.now(), engine.search());
+        let wanted = Wanted { scene: first.choice.map(Arc::new), search, limits: first.limits, ..Wanted::default() };
         Self {
             engine,
             wanted,
@@ -217,8 +217,8 @@ impl Viewer {
     fn change_edits(&mut self, change: impl FnOnce(&mut Edits)) {
         if self.editing.is_some() {
             change(&mut self.edits);
-            (self.wanted.search, self.wanted.settings) =
-                (Some(self.edits.search()), Some(Arc::clone(self.edits.now())));
+            self.wanted.search = self.edits.search();
+            self.wanted.settings = Some(Arc::clone(self.edits.now()));
         }
     }
 

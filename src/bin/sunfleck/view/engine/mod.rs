@@ -63,8 +63,8 @@ pub struct Wanted {
     pub reloads: u32,
     /// In the place of those that the scene was opened with.
     pub settings: Option<Arc<Settings>>,
-    /// In the place of how the device was opened to search.
-    pub search: Option<Search>,
+    /// At first as [`Engine::search`] says; otherwise, the device is opened anew.
+    pub search: Search,
     /// The camera is moving: quick previews instead of the picture.
     pub moving: bool,
     /// Counts restarts.

@@ -341,7 +341,7 @@ fn searched_in_both_ways(device: Device) -> [Film; 2] {
     let before = bench.wait_for_film(&Phase::Reached, 2);
     let [first, other] = bench.engine.searches()[..] else { panic!("{:?}", bench.engine.searches()) };
     assert_eq!(bench.engine.search(), first);
-    bench.wanted.search = Some(other);
+    bench.wanted.search = other;
     bench.send();
     let after = bench.wait("another estimate", |now| {
         now.estimate > before.estimate && now.phase == Phase::Reached && iterations(now) == Some(2)

@@ -116,11 +116,10 @@ impl Have {
         if is_retry && device.is_lost() {
             *device = device.reopen(device.search())?;
         }
-        let search = wanted.search.unwrap_or_else(|| device.search());
-        if device.search() != search && (is_retry || is_other_scene || before.search != wanted.search) {
+        if device.search() != wanted.search && (is_retry || is_other_scene || before.search != wanted.search) {
             // The memory of the old one first.
             self.session = None;
-            *device = device.reopen(search)?;
+            *device = device.reopen(wanted.search)?;
         }
         if is_other_scene {
             // The memory of the old one first.

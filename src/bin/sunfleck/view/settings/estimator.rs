@@ -124,57 +124,32 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
 
     numbers(ui, viewer, read, now);
 
-    let search = viewer.edits.search();
-    by(
-        ui,
-        viewer,
-        INDEX,
-        &mut |index| Search { index, ..search },
-        |search| search.index,
-        |index| match index {
-            Method::Tree => ("Tree", "Sunfleck's own tree over the photons."),
-            Method::Hardware => ("Ray queries", "The ray tracing hardware of the graphics card."),
-        },
-    );
-    by(
-        ui,
-        viewer,
-        ACCELERATOR,
-        &mut |accelerator| Search { accelerator, ..search },
-        |search| search.accelerator,
-        |accelerator| match accelerator {
-            Accelerator::Bvh => ("Boxes (bvh)", "A bounding volume hierarchy."),
-            Accelerator::Kd => ("Planes (kd)", "A kd-tree."),
-        },
-    );
+    search(ui, viewer, INDEX, |search| match search.index {
+        Method::Tree => ("Tree", "Sunfleck's own tree over the photons."),
+        Method::Hardware => ("Ray queries", "The ray tracing hardware of the graphics card."),
+    });
+    search(ui, viewer, ACCELERATOR, |search| match search.accelerator {
+        Accelerator::Bvh => ("Boxes (bvh)", "A bounding volume hierarchy."),
+        Accelerator::Kd => ("Planes (kd)", "A kd-tree."),
+    });
 }
 
-/// One of the ways to search that the device has; back is the way it was opened with.
-fn by<T: Copy + PartialEq>(
-    ui: &mut Ui,
-    viewer: &mut Viewer,
-    name: Name,
-    with: &mut dyn FnMut(T) -> Search,
-    part: fn(&Search) -> T,
-    words: fn(T) -> (&'static str, &'static str),
-) {
-    let all: Vec<_> = viewer.engine().searches().iter().map(part).fold(vec![], |mut all, one| {
-        if !all.contains(&one) {
-            all.push(one);
-        }
-        all
-    });
-    let all: Vec<_> = all.into_iter().map(|one| (one, words(one).0, words(one).1)).collect();
-    let (was, now) = (part(&viewer.engine().search()), part(&viewer.edits.search()));
-    let mut chosen = now;
-    let reset = row(ui, name, now != was, |ui| {
+/// The ways to search that the device has, as far as `words` tells them apart; back is the way it was opened with.
+fn search(ui: &mut Ui, viewer: &mut Viewer, name: Name, words: fn(&Search) -> (&'static str, &'static str)) {
+    let mut all: Vec<_> = viewer.engine().searches().iter().map(|s| (*s, words(s).0, words(s).1)).collect();
+    all.dedup_by_key(|(_, word, _)| *word);
+    let (was, now) = (viewer.engine().search(), viewer.edits.search());
+    let of_now = |(_, word, _): &&(Search, &str, &str)| *word == words(&now).0;
+    let before = all.iter().find(of_now).map_or(now, |(search, ..)| *search);
+    let mut chosen = before;
+    let reset = row(ui, name, words(&now) != words(&was), |ui| {
         ui.add_enabled_ui(all.len() > 1, |ui| choice(ui, name.name, &mut chosen, &all)).inner
     });
     if reset {
         chosen = was;
     }
-    if chosen != now {
-        viewer.search_by(with(chosen));
+    if chosen != before {
+        viewer.search_by(chosen);
     }
 }
 

@@ -343,19 +343,19 @@ fn every_control_of_the_settings_does_something() {
 fn how_to_search_is_a_setting_that_can_be_undone() {
     let mut window = Window::with_picture();
     let estimate = window.viewer().now.estimate;
-    let accelerator = |window: &mut Window| window.viewer().wanted.search.map(|search| search.accelerator);
+    let accelerator = |window: &mut Window| window.viewer().wanted.search.accelerator;
     window.harness.get_by_role_and_label(Role::ComboBox, "Accelerator").click_accesskit();
     window.steps(3);
     window.click("Planes (kd)");
-    assert_eq!(accelerator(&mut window), Some(Accelerator::Kd));
+    assert_eq!(accelerator(&mut window), Accelerator::Kd);
     window.wait("another estimate", move |viewer| viewer.now.estimate > estimate);
     window.wait_for_picture();
     assert!(window.viewer().command().unwrap().contains(" --accel kd"));
     window.press(Modifiers::COMMAND, Key::Z);
-    assert_eq!(accelerator(&mut window), Some(Accelerator::Bvh));
+    assert_eq!(accelerator(&mut window), Accelerator::Bvh);
     window.press(Modifiers::COMMAND, Key::Y);
     window.activate("Reset accelerator");
-    assert_eq!(accelerator(&mut window), Some(Accelerator::Bvh));
+    assert_eq!(accelerator(&mut window), Accelerator::Bvh);
     // The processor has but one index.
     assert!(window.harness.get_by_role_and_label(Role::ComboBox, "Index").accesskit_node().is_disabled());
 }
