@@ -3,7 +3,7 @@
 //! A real window is opened, on the display there is, and closed again. It draws as often as the display lets it; the
 //! figures are of all its frames, first while the camera rests, then while the pointer turns it for 0.3 s in every 1.2 s.
 //! What a frame costs the interface thread leaves out where it waits for the display; the time from one frame to the
-//! next has all.
+//! next has all. Without a display the same is drawn into a texture, at the pace of one of 60 Hz.
 
 use anyhow::Result;
 use clap::Args;
@@ -36,6 +36,10 @@ pub struct ViewBenchArgs {
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     seconds: Option<f64>,
 
+    /// Draw into a texture at 60 Hz: for a machine without a display
+    #[arg(long)]
+    offscreen: bool,
+
     #[command(flatten)]
     place: Where,
 }
@@ -53,7 +57,7 @@ pub fn run(args: &ViewBenchArgs) -> Result<()> {
     common.prepare("view", &[])?;
     let backends = backends::names(&args.place.backend);
     let seconds = args.seconds.unwrap_or(if common.quick { 3.0 } else { 20.0 });
-    let plan = Plan { scene: args.scene.clone(), set: args.set.clone(), seconds };
+    let plan = Plan { scene: args.scene.clone(), set: args.set.clone(), seconds, offscreen: args.offscreen };
     let mut steps = common.steps(backends.len());
     let mut found = Vec::new();
     for backend in &backends {
@@ -64,7 +68,7 @@ pub fn run(args: &ViewBenchArgs) -> Result<()> {
         name: "view",
         machine: Machine::here(found.iter().map(|(_, figures)| figures.renderer.clone()).collect()),
         settings: json!({
-            "quick": common.quick, "scene": plan.scene, "set": plan.set, "seconds": seconds, "backends": backends,
+            "quick": common.quick, "scene": plan.scene, "set": plan.set, "seconds": seconds, "offscreen": plan.offscreen, "backends": backends,
         }),
         notes: NOTES,
         rows: found.iter().flat_map(|(backend, figures)| rows(backend, figures)).collect(),

@@ -8,7 +8,7 @@ use egui::{Event, Modifiers, PointerButton, Pos2, vec2};
 
 use super::app::{First, Viewer};
 use super::engine::{Choice, Engine, Limits, Phase};
-use super::window::{self, Bell, Guest};
+use super::window::{self, Bell, Drawn, Guest};
 use crate::devices::Device;
 
 /// Of the pointer, points a frame, and how long it moves and then rests, seconds.
@@ -26,6 +26,8 @@ pub struct Plan {
     pub set: Vec<String>,
     /// Of each part, seconds.
     pub seconds: f64,
+    /// Into a texture, where there is no display.
+    pub offscreen: bool,
 }
 
 /// Frames of one part, in their order, seconds.
@@ -53,7 +55,7 @@ pub struct Figures {
     pub waits: Vec<f64>,
 }
 
-/// Opens a window that asks for frames as fast as the display takes them, and closes it by itself.
+/// Opens a window, or what stands for one, that asks for frames as fast as the display takes them, and closes it by itself.
 pub fn run(device: Device, plan: &Plan) -> Result<Figures> {
     let folder = tempfile::tempdir()?;
     let options = || {
@@ -68,7 +70,10 @@ pub fn run(device: Device, plan: &Plan) -> Result<Figures> {
     let engine = Engine::start(device, bell.wake())?;
     let mut viewer = Viewer::new(engine, bell.wake(), first);
     let mut observer = Observer::new(plan.seconds);
-    window::run(&mut viewer, &bell, options, &mut observer)?;
+    match plan.offscreen {
+        true => super::offscreen::run(&mut viewer, &bell, &mut observer)?,
+        false => window::run(&mut viewer, &bell, options, &mut observer)?,
+    }
     if let Some(error) = observer.error {
         bail!("{error}");
     }
@@ -174,14 +179,14 @@ impl Guest for Observer {
         }
     }
 
-    fn after_frame(&mut self, viewer: &Viewer, ui: &egui::Ui, frame: &eframe::Frame) {
-        self.note(viewer, frame.info().cpu_usage);
+    fn after_frame(&mut self, viewer: &Viewer, ui: &egui::Ui, drawn: &Drawn<'_>) {
+        self.note(viewer, drawn.work);
         match (&viewer.now.phase, self.part) {
             (Phase::Failed(error), _) => self.error = Some(error.clone()),
             (_, Part::Opening) if viewer.now.painted.is_some() => {
                 self.figures.renderer.clone_from(&viewer.now.device);
-                if let Some(state) = frame.wgpu_render_state() {
-                    self.figures.window = state.adapter.get_info().name;
+                if let Some(device) = drawn.device {
+                    self.figures.window = device.adapter_info().name;
                 }
                 self.enter(Part::Resting);
             }
@@ -194,5 +199,31 @@ impl Guest for Observer {
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
         }
         ui.ctx().request_repaint();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_and_waits_are_counted_without_a_display() {
+        if sunfleck::gpu::list_devices().is_empty() {
+            assert!(std::env::var_os("SUNFLECK_REQUIRE_GPU").is_none(), "SUNFLECK_REQUIRE_GPU is set, but no adapter");
+            return;
+        }
+        let set = ["size=32x24", "photons=500"].map(str::to_owned).to_vec();
+        let plan = |scene: &str| Plan { scene: scene.into(), set: set.clone(), seconds: 1.0, offscreen: true };
+        let device = || Device::Cpu(sunfleck::scene::Accelerator::Bvh);
+        let figures = run(device(), &plan("cornell")).unwrap();
+        assert!(figures.renderer.starts_with("CPU") && !figures.window.is_empty(), "{figures:?}");
+        for frames in [&figures.resting, &figures.turning] {
+            assert!(!frames.intervals.is_empty() && frames.iterations > 0, "{frames:?}");
+            // Work is part of the time between frames.
+            assert!(frames.work.iter().sum::<f64>() <= frames.intervals.iter().sum::<f64>() + 1.0, "{frames:?}");
+        }
+        assert!(!figures.waits.is_empty());
+        let error = run(device(), &plan("nowhere.glb")).unwrap_err().to_string();
+        assert!(error.contains("nowhere.glb"), "{error}");
     }
 }

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::{panic, thread};
 
 use anyhow::{Result, anyhow};
-use eframe::egui;
+use eframe::{egui, wgpu};
 
 use super::app::Viewer;
 use super::engine::{Message, Wake, catch};
@@ -20,7 +20,7 @@ pub const FEWEST_FRAMES: usize = 10;
 pub struct Bell(Arc<Mutex<Option<egui::Context>>>);
 
 impl Bell {
-    fn hang(&self, context: &egui::Context) {
+    pub fn hang(&self, context: &egui::Context) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(context.clone());
     }
 
@@ -39,15 +39,29 @@ impl Bell {
 
 /// What went wrong with the device that draws the window; nothing while it works.
 #[derive(Clone, Default)]
-struct Fault(Arc<Mutex<Option<String>>>);
+pub struct Fault(Arc<Mutex<Option<String>>>);
 
 impl Fault {
+    /// Notes what `device` reports, which wgpu would panic of, and calls `then`.
+    pub fn watch(&self, device: &wgpu::Device, then: impl Fn() + Clone + Send + Sync + 'static) {
+        let (lost, then_too) = (self.clone(), then.clone());
+        device.set_device_lost_callback(move |_, text| {
+            lost.set(if text.is_empty() { "lost".to_owned() } else { crate::one_line(&text) });
+            then_too();
+        });
+        let wrong = self.clone();
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            wrong.set(crate::one_line(&error.to_string()));
+            then();
+        }));
+    }
+
     /// The first is told; others follow from it.
     fn set(&self, text: String) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(text);
     }
 
-    fn get(&self) -> Option<String> {
+    pub fn get(&self) -> Option<String> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
@@ -58,7 +72,14 @@ pub trait Guest {
     fn add_input(&mut self, _: &Viewer, _: &mut egui::RawInput) {}
 
     /// After every frame, before it is drawn.
-    fn after_frame(&mut self, _: &Viewer, _: &egui::Ui, _: &eframe::Frame) {}
+    fn after_frame(&mut self, _: &Viewer, _: &egui::Ui, _: &Drawn<'_>) {}
+}
+
+/// What frames are drawn with.
+pub struct Drawn<'a> {
+    /// What the frame before took the interface thread, waits for the display left out, seconds.
+    pub work: Option<f32>,
+    pub device: Option<&'a wgpu::Device>,
 }
 
 /// Nobody.
@@ -96,7 +117,10 @@ pub fn run(
                 Box::new(|creation| {
                     let (viewer, guest, n_frames) = shown;
                     bell.hang(&creation.egui_ctx);
-                    watch(creation, &fault);
+                    if let Some(state) = &creation.wgpu_render_state {
+                        let context = creation.egui_ctx.clone();
+                        fault.watch(&state.device, move || context.request_repaint());
+                    }
                     viewer.enter(creation.storage);
                     Ok(Box::new(Window { viewer, guest, n_frames, fault: fault.clone() }))
                 }),
@@ -145,21 +169,6 @@ fn quietly<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     done
 }
 
-/// Notes what the window's device reports: without this wgpu panics.
-fn watch(creation: &eframe::CreationContext<'_>, fault: &Fault) {
-    let Some(state) = &creation.wgpu_render_state else { return };
-    let (lost, context) = (fault.clone(), creation.egui_ctx.clone());
-    state.device.set_device_lost_callback(move |_, text| {
-        lost.set(if text.is_empty() { "lost".to_owned() } else { crate::one_line(&text) });
-        context.request_repaint();
-    });
-    let (wrong, context) = (fault.clone(), creation.egui_ctx.clone());
-    state.device.on_uncaptured_error(Arc::new(move |error: eframe::wgpu::Error| {
-        wrong.set(crate::one_line(&error.to_string()));
-        context.request_repaint();
-    }));
-}
-
 /// Writes the newest film where the user wanted pictures, or wherever it can be written; where that is.
 fn rescue(viewer: &Viewer) -> Option<PathBuf> {
     let name = format!("sunfleck-{}.exr", std::process::id());
@@ -187,7 +196,9 @@ impl<G: Guest> eframe::App for Window<'_, G> {
         }
         self.viewer.show(ui, frame.info().cpu_usage);
         *self.n_frames += 1;
-        self.guest.after_frame(self.viewer, ui, frame);
+        let state = frame.wgpu_render_state();
+        let device = state.map(|state| &state.device);
+        self.guest.after_frame(self.viewer, ui, &Drawn { work: frame.info().cpu_usage, device });
     }
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {

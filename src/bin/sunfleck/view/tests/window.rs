@@ -10,7 +10,7 @@ use sunfleck::gpu::Context;
 
 use super::super::app::{First, Viewer};
 use super::super::engine::{Choice, Engine, Limits, Phase};
-use super::super::window::{self, Bell, FEWEST_FRAMES, Guest};
+use super::super::window::{self, Bell, Drawn, FEWEST_FRAMES, Guest};
 use super::PATIENCE;
 use crate::devices::Device;
 
@@ -71,10 +71,10 @@ impl Guest for Vandal {
         }
     }
 
-    fn after_frame(&mut self, viewer: &Viewer, ui: &egui::Ui, frame: &eframe::Frame) {
+    fn after_frame(&mut self, viewer: &Viewer, ui: &egui::Ui, drawn: &Drawn<'_>) {
         ui.ctx().request_repaint();
         assert!(self.began.elapsed() < PATIENCE, "{:?}", viewer.now.phase);
-        let device = &frame.wgpu_render_state().expect("drawn by wgpu").device;
+        let device = drawn.device.expect("drawn by wgpu");
         if self.context.as_ref() != Some(ui.ctx()) {
             (self.context, self.device) = (Some(ui.ctx().clone()), Some(device.clone()));
             (self.windows, self.frames) = (self.windows + 1, 0);
@@ -104,7 +104,7 @@ struct Onlooker {
 }
 
 impl Guest for Onlooker {
-    fn after_frame(&mut self, viewer: &Viewer, ui: &egui::Ui, _: &eframe::Frame) {
+    fn after_frame(&mut self, viewer: &Viewer, ui: &egui::Ui, _: &Drawn<'_>) {
         ui.ctx().request_repaint();
         assert!(self.began.elapsed() < PATIENCE, "{:?}", viewer.now.phase);
         let Some(frame) = &viewer.now.frame else { return };
