@@ -45,8 +45,8 @@ pub fn run(viewer: &mut Viewer, bell: &Bell, guest: &mut impl Guest) -> Result<(
         });
         let commands = output.viewport_output.values().flat_map(|viewport| &viewport.commands);
         let is_last = commands.into_iter().any(|command| matches!(command, egui::ViewportCommand::Close));
-        canvas.draw(&context, output)?;
-        work = Some(now.elapsed().as_secs_f32());
+        let submitting = canvas.draw(&context, output)?;
+        work = Some(now.elapsed().saturating_sub(submitting).as_secs_f32());
         if is_last {
             return Ok(());
         }
@@ -96,7 +96,8 @@ impl Canvas {
         Ok(Self { device, queue, renderer, view, fault, submitted: VecDeque::new() })
     }
 
-    fn draw(&mut self, context: &egui::Context, mut output: egui::FullOutput) -> Result<()> {
+    /// Returns what the queue took, which eframe counts as waiting for the display.
+    fn draw(&mut self, context: &egui::Context, mut output: egui::FullOutput) -> Result<Duration> {
         let screen = ScreenDescriptor { size_in_pixels: SIZE, pixels_per_point: output.pixels_per_point };
         let shapes = context.tessellate(output.shapes, output.pixels_per_point);
         for (id, deltas) in output.textures_delta.set.drain() {
@@ -118,11 +119,13 @@ impl Canvas {
         });
         self.renderer.render(&mut pass.forget_lifetime(), &shapes, &screen);
         commands.push(encoder.finish());
+        let began = Instant::now();
         self.submitted.push_back(self.queue.submit(commands));
+        let submitting = began.elapsed();
         output.textures_delta.free.drain().for_each(|id| self.renderer.free_texture(&id));
         match self.fault.get() {
             Some(fault) => bail!("the window's graphics device failed: {fault}"),
-            None => Ok(()),
+            None => Ok(submitting),
         }
     }
 
