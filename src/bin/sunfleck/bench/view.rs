@@ -28,7 +28,7 @@ pub struct ViewBenchArgs {
     #[arg(long, value_name = "SCENE", default_value = "pool")]
     scene: String,
 
-    /// Change a setting of the scene, as in `sunfleck view`
+    /// Change a setting of the scene, as in `sunfleck view`; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 
@@ -57,7 +57,8 @@ pub fn run(args: &ViewBenchArgs) -> Result<()> {
     common.prepare("view", &[])?;
     let backends = backends::names(&args.place.backend);
     let seconds = args.seconds.unwrap_or(if common.quick { 3.0 } else { 20.0 });
-    let plan = Plan { scene: args.scene.clone(), set: args.set.clone(), seconds, offscreen: args.offscreen };
+    let set = [vec![format!("seed={}", common.seed)], args.set.clone()].concat();
+    let plan = Plan { scene: args.scene.clone(), set, seconds, offscreen: args.offscreen };
     let mut steps = common.steps(backends.len());
     let mut found = Vec::new();
     for backend in &backends {
