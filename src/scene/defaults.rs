@@ -2,6 +2,7 @@
 
 use super::{Camera, Environment, Material, Scene};
 use glam::Vec3;
+use std::sync::Arc;
 
 /// Texels of the default sky's height; its width is twice that.
 const SKY_HEIGHT: u32 = 128;
@@ -54,7 +55,7 @@ pub fn default_sky() -> Environment {
         base + SUN * ((direction.dot(sun_direction) - 1.0) / SUN_WIDTH).exp()
     };
     let texels = (0..width * height).map(texel).collect();
-    Environment { width, height, texels, rotation: 0.0, strength: 1.0 }
+    Environment { width, height, texels: Arc::new(texels), rotation: 0.0, strength: 1.0 }
 }
 
 fn smoothstep(t: f32) -> f32 {

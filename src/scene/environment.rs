@@ -21,7 +21,7 @@ impl Environment {
 
     /// The same radiance from everywhere. Several rows, for directions are sampled by row.
     pub fn uniform(radiance: Vec3) -> Self {
-        Self { width: 2, height: 32, texels: vec![radiance; 64], rotation: 0.0, strength: 1.0 }
+        Self { width: 2, height: 32, texels: vec![radiance; 64].into(), rotation: 0.0, strength: 1.0 }
     }
 }
 

@@ -4,6 +4,8 @@
 //! emission (nits in glTF), intensity per steradian for point and spot lights (candela), irradiance for directional
 //! ones (lux). Colours are linear RGB with the sRGB primaries.
 
+use std::sync::Arc;
+
 use glam::{Affine3A, Mat2, Vec2, Vec3, Vec4};
 
 /// Everything a picture is computed from. Plain data: [`Scene::check`] says whether it can be rendered.
@@ -279,8 +281,8 @@ pub struct Environment {
     pub width: u32,
     /// Pixels.
     pub height: u32,
-    /// Radiance, linear RGB, `[height · width]`, row 0 is +y.
-    pub texels: Vec<Vec3>,
+    /// Radiance, linear RGB, `[height · width]`, row 0 is +y. Shared: a clone costs nothing.
+    pub texels: Arc<Vec<Vec3>>,
     /// Radians about +y, counter-clockwise seen from above.
     pub rotation: f32,
     /// Factor on every texel.

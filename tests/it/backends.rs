@@ -128,7 +128,7 @@ pub fn everything() -> Scene {
         environment: Some(Environment {
             width: 32,
             height: 16,
-            texels: (0..512).map(|i| Vec3::from_slice(&random(i, 1)).powf(4.0)).collect(),
+            texels: (0..512).map(|i| Vec3::from_slice(&random(i, 1)).powf(4.0)).collect::<Vec<_>>().into(),
             rotation: 0.7,
             strength: 0.02,
         }),

@@ -99,7 +99,7 @@ fn read_scene(description: &Value) -> (Scene, Camera) {
         scene.environment = Some(Environment {
             width: number(&e["width"]) as u32,
             height: number(&e["height"]) as u32,
-            texels: list(&e["rgb"]).map(vector).collect(),
+            texels: list(&e["rgb"]).map(vector).collect::<Vec<_>>().into(),
             rotation: number(&e["rotation"]),
             strength: 1.0,
         });

@@ -74,8 +74,10 @@ pub fn open(args: &DeviceArgs, progress: &Progress) -> Result<Device> {
 pub fn open_backend(name: &str) -> Result<Device> {
     Ok(match name {
         "cpu" => Device::Cpu(Accelerator::Bvh),
-        "gpu-hardware" => Device::Gpu(Arc::new(Context::with_ray_queries(&Choice::Any)?), Method::Hardware),
-        _ => Device::Gpu(Arc::new(Context::new(&Choice::Any)?), Method::Tree),
+        _ => {
+            let method = if name == "gpu-hardware" { Method::Hardware } else { Method::Tree };
+            Device::Gpu(Arc::new(context_for(method, &Choice::Any)?), method)
+        }
     })
 }
 
@@ -117,11 +119,7 @@ fn open_gpu(args: &DeviceArgs, progress: &Progress) -> Result<Device> {
         None if devices.iter().any(gpu::DeviceInfo::is_real) || method == Method::Hardware => Choice::Real,
         None => return Ok(Device::Cpu(Accelerator::Bvh)),
     };
-    let opened = match method {
-        Method::Tree => Context::new(&choice),
-        Method::Hardware => Context::with_ray_queries(&choice),
-    };
-    match opened {
+    match context_for(method, &choice) {
         Ok(context) => Ok(Device::Gpu(Arc::new(context), method)),
         // Nobody asked for a GPU, and there is something else.
         Err(error) if choice == Choice::Real && method == Method::Tree => {
@@ -129,6 +127,15 @@ fn open_gpu(args: &DeviceArgs, progress: &Progress) -> Result<Device> {
             Ok(Device::Cpu(Accelerator::Bvh))
         }
         Err(error) => Err(error.into()),
+    }
+}
+
+/// An adapter opened with what the method needs.
+#[cfg(feature = "gpu")]
+fn context_for(method: Method, choice: &Choice) -> Result<Context, sunfleck::ppm::Error> {
+    match method {
+        Method::Tree => Context::new(choice),
+        Method::Hardware => Context::with_ray_queries(choice),
     }
 }
 
@@ -198,12 +205,7 @@ impl Device {
         Ok(match self {
             Self::Cpu(_) => Self::Cpu(search.accelerator),
             Self::Gpu(context, _) => {
-                let choice = Choice::Index(context.info().index);
-                let context = match search.index {
-                    Method::Tree => Context::new(&choice)?,
-                    Method::Hardware => Context::with_ray_queries(&choice)?,
-                };
-                Self::Gpu(Arc::new(context), search.index)
+                Self::Gpu(Arc::new(context_for(search.index, &Choice::Index(context.info().index))?), search.index)
             }
         })
     }
@@ -228,27 +230,18 @@ impl Device {
 
     /// Takes the scene to the device.
     pub fn stages(&self, input: &Input) -> Result<Box<dyn Stages>> {
-        self.stages_of(self.pack(&input.scene, None)?, input, None)
+        self.stages_of(self.pack(&input.scene, None)?, input)
     }
 
-    /// The same with a scene of [`Device::pack`]. A dispatch on a GPU is to take `dispatch_seconds` at most.
-    pub fn stages_of(
-        &self,
-        scene: Arc<PackedScene>,
-        input: &Input,
-        dispatch_seconds: Option<f64>,
-    ) -> Result<Box<dyn Stages>> {
+    /// The same with a scene of [`Device::pack`].
+    pub fn stages_of(&self, scene: Arc<PackedScene>, input: &Input) -> Result<Box<dyn Stages>> {
         let params = &input.params;
         let camera = input.camera.pack(params.size[0], params.size[1]);
         Ok(match self {
             Self::Cpu(_) => Box::new(CpuStages::new(scene, camera, params.film_size())),
             #[cfg(feature = "gpu")]
             Self::Gpu(context, method) => {
-                let mut stages = GpuStages::with_method(Arc::clone(context), &scene, camera, *method)?;
-                if let Some(seconds) = dispatch_seconds {
-                    stages.set_dispatch_seconds(seconds);
-                }
-                Box::new(stages)
+                Box::new(GpuStages::with_method(Arc::clone(context), &scene, camera, *method)?)
             }
         })
     }

@@ -75,10 +75,10 @@ pub fn read(path: &Path) -> Result<Loaded> {
             warnings.iter().for_each(|warning| eprintln!("sunfleck: warning: {warning}"));
             Ok(loaded)
         }
-        "obj" | "ply" | "stl" | "off" | "node" | "face" => Ok(io::read(path)?),
+        known if io::EXTENSIONS.contains(&known) => Ok(io::read(path)?),
         _ => {
-            let known = io::EXTENSIONS;
-            bail!("{}: the extension {extension:?} is none of .gltf, .glb, {known}", path.display())
+            let known = io::EXTENSIONS.join(", .");
+            bail!("{}: the extension {extension:?} is none of .gltf, .glb, .{known}", path.display())
         }
     }
 }

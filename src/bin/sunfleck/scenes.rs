@@ -196,7 +196,7 @@ pub fn export(args: &ExportArgs) -> Result<ExitCode> {
     atomic::write(path, |writer| writer.write_all(&bytes))?;
     eprintln!("wrote {}", path.display());
     if let Some(mut environment) = scene.environment {
-        environment.texels.iter_mut().for_each(|texel| *texel *= environment.strength);
+        Arc::make_mut(&mut environment.texels).iter_mut().for_each(|texel| *texel *= environment.strength);
         let beside = path.with_extension("hdr");
         export::write_environment_hdr(&environment, &beside)?;
         let turned = match environment.rotation {

@@ -36,6 +36,8 @@ const FIRST_CHUNK: u32 = 65536;
 const MOST_PIXELS: u32 = 1 << 19;
 /// Seconds a dispatch may take unless the caller says, well below what watchdogs allow.
 const DISPATCH_SECONDS: f64 = 0.1;
+/// The same with an interrupt, which takes effect between two; whoever shares the device has a turn there.
+const INTERRUPTIBLE_SECONDS: f64 = 0.01;
 
 // The stages that are timed.
 const EYE: usize = 0;
@@ -146,7 +148,7 @@ impl GpuStages {
         })
     }
 
-    /// How long one dispatch of eye paths, photon paths or the gather is to take at most, seconds (0.1 if never called):
+    /// How long one dispatch of eye paths, photon paths or the gather is to take at most, seconds (if never called 0.1, or 0.01 with an interrupt):
     /// short ones let whoever shares the device have a turn. It is aimed at from what [`Stages::times`] last read, down to
     /// a smallest dispatch, and changes no bit of the picture.
     pub fn set_dispatch_seconds(&mut self, seconds: f64) {
@@ -240,6 +242,9 @@ impl Stages for GpuStages {
     }
 
     fn set_interrupt(&mut self, interrupt: Interrupt) {
+        if interrupt.is_set() {
+            self.dispatch_seconds = self.dispatch_seconds.min(INTERRUPTIBLE_SECONDS);
+        }
         self.shared.interrupt = interrupt;
     }
 

@@ -25,8 +25,8 @@ pub use stl::read_stl;
 pub use tetgen::read_tetgen;
 pub use write::{Format, write};
 
-/// What [`read`] reads, for messages.
-pub const EXTENSIONS: &str = ".obj, .ply, .stl, .off, .node and .face";
+/// What [`read`] reads.
+pub const EXTENSIONS: [&str; 6] = ["obj", "ply", "stl", "off", "node", "face"];
 
 /// Faces of a file, at most, triangulated: as many as a kd-tree takes.
 const MAX_FACES: usize = 1 << 28;
@@ -103,7 +103,7 @@ pub fn read(path: &Path) -> Result<Loaded, Error> {
         "stl" => read_stl(file, size),
         "off" => read_off(file),
         "gltf" | "glb" => Err("glTF is read by sunfleck::scene::load::load_gltf_mesh".into()),
-        _ => Err(format!("the extension {extension:?} is none of {EXTENSIONS}")),
+        _ => Err(format!("the extension {extension:?} is none of .{}", EXTENSIONS.join(", ."))),
     };
     loaded.map_err(fail)
 }

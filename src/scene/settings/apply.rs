@@ -11,6 +11,7 @@ use crate::scene::{
 };
 use glam::{Affine3A, Vec3};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Collects the first wrong value.
 pub(super) struct Checks(Result<(), Wrong>);
@@ -281,7 +282,7 @@ impl EnvironmentSettings {
             }
         };
         if let Some(color) = self.color.map(Vec3::from) {
-            environment.texels.iter_mut().for_each(|texel| *texel *= color);
+            Arc::make_mut(&mut environment.texels).iter_mut().for_each(|texel| *texel *= color);
         }
         environment.rotation = self.rotation_degrees.map_or(environment.rotation, f32::to_radians);
         environment.strength = self.strength.unwrap_or(environment.strength);

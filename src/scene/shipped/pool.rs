@@ -3,6 +3,8 @@
 //! The water is the sheet of its waves, which goes on a little way into the walls: below it a path is in water until it
 //! comes out again, so floor and walls need no surface of their own.
 
+use std::sync::Arc;
+
 use glam::{Affine3A, Quat, Vec2, Vec3};
 
 use super::curved::{Profile, spline};
@@ -329,5 +331,5 @@ fn sky() -> Environment {
             std::iter::repeat_n(color, width as usize)
         })
         .collect();
-    Environment { width, height, texels, rotation: 0.0, strength: 1.0 }
+    Environment { width, height, texels: Arc::new(texels), rotation: 0.0, strength: 1.0 }
 }

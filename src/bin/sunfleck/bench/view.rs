@@ -5,6 +5,8 @@
 //! What a frame costs the interface thread leaves out where it waits for the display; the time from one frame to the
 //! next has all. Without a display the same is drawn into a texture, at the pace of one of 60 Hz.
 
+use std::time::Duration;
+
 use anyhow::Result;
 use clap::Args;
 use serde_json::json;
@@ -13,6 +15,7 @@ use super::report::{self, Machine, Report, Row};
 use super::{Common, Where, backends};
 use crate::devices;
 use crate::view::measure::{self, Figures, Frames, Plan};
+use crate::view::timing::percentile;
 
 const NOTES: &[&str] = &[
     "interval: from one frame of the window to the next; work: of the interface thread, waits for the display left out",
@@ -81,22 +84,20 @@ pub fn run(args: &ViewBenchArgs) -> Result<()> {
 }
 
 /// The two parts and what they are called.
-fn parts(figures: &Figures) -> [(&'static str, &Frames, &[f64]); 2] {
+fn parts(figures: &Figures) -> [(&'static str, &Frames, &[Duration]); 2] {
     [("resting", &figures.resting, &[]), ("turning", &figures.turning, &figures.waits)]
 }
 
 /// Median, 95th percentile and most, milliseconds; none of nothing.
-fn percentiles(seconds: &[f64]) -> [Option<f64>; 3] {
-    let mut sorted = seconds.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    [0.5, 0.95, 1.0].map(|part: f64| {
-        let rank = (part * sorted.len() as f64).ceil() as usize;
-        sorted.get(rank.saturating_sub(1)).map(|s| (s * 1e6).round() / 1e3)
+fn percentiles(times: &[Duration]) -> [Option<f64>; 3] {
+    [0.5, 0.95, 1.0].map(|part| {
+        let time = percentile(times.iter().copied(), part)?;
+        Some((time.as_secs_f64() * 1e6).round() / 1e3)
     })
 }
 
 fn rows(backend: &str, figures: &Figures) -> Vec<Row> {
-    let of_part = |(part, frames, waits): (&str, &Frames, &[f64])| {
+    let of_part = |(part, frames, waits): (&str, &Frames, &[Duration])| {
         let mut row = Row::default()
             .with("backend", backend)
             .with("renderer", figures.renderer.as_str())
@@ -117,7 +118,7 @@ fn rows(backend: &str, figures: &Figures) -> Vec<Row> {
 fn print(machine: &Machine, plan: &Plan, found: &[(&str, Figures)]) {
     let header =
         ["renderer", "camera", "frames", "iterations", "frame to frame", "interface thread", "input to picture"];
-    let cell = |times: &[f64]| match percentiles(times).map(|ms| ms.map(report::figure)) {
+    let cell = |times: &[Duration]| match percentiles(times).map(|ms| ms.map(report::figure)) {
         [Some(median), Some(most_of), Some(most)] => format!("{median} / {most_of} / {most}"),
         _ => "–".into(),
     };
@@ -128,9 +129,8 @@ fn print(machine: &Machine, plan: &Plan, found: &[(&str, Figures)]) {
             [(*backend).to_owned(), part.to_owned(), n, iterations].into_iter().chain(times).collect()
         })
     });
-    let windows: Vec<&str> = found.iter().map(|(_, figures)| figures.window.as_str()).collect();
     let table = report::table(&header, 2, lines);
-    let drawn = windows.first().copied().unwrap_or_default();
+    let drawn = found.first().map_or("", |(_, figures)| figures.window.as_str());
     crate::print(&format!(
         "{}\nThe window, drawn by {drawn}, while {} renders; milliseconds: median / 95 % within / most\n{table}",
         machine.line(),
@@ -143,10 +143,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn percentiles_are_ranks() {
-        let times: Vec<f64> = (1..=100).rev().map(|i| f64::from(i) / 1e3).collect();
+    fn percentiles_are_in_milliseconds() {
+        let times: Vec<Duration> = (1..=100).rev().map(Duration::from_millis).collect();
         assert_eq!(percentiles(&times), [Some(50.0), Some(95.0), Some(100.0)]);
         assert_eq!(percentiles(&[]), [None; 3]);
-        assert_eq!(percentiles(&[0.002]), [Some(2.0); 3]);
+        assert_eq!(percentiles(&[Duration::from_micros(2000)]), [Some(2.0); 3]);
     }
 }

@@ -10,7 +10,7 @@ use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::Camera;
 use sunfleck::scene::settings::Settings;
 
-use super::engine::{Choice, Engine, Limits, Message, Now, Opened, Phase, Save, Wake, Wanted};
+use super::engine::{Choice, Engine, Limits, Message, Now, Opened, Phase, Save, Wake, Wanted, is_same};
 use super::files;
 use super::picture::PictureView;
 use super::state::{Edits, Remembered};
@@ -375,12 +375,7 @@ impl Viewer {
         }
         let time = ui.input(|i| i.time);
         self.messages.extend(self.engine.take_messages().into_iter().map(|message| (time, message)));
-        let same = match (&self.editing, &self.now.opened) {
-            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
-            (None, None) => true,
-            _ => false,
-        };
-        if !same {
+        if !is_same(self.editing.as_ref(), self.now.opened.as_ref()) {
             self.selected = None;
             let is_reload = self.wanted.settings.is_some() && self.now.opened.is_some();
             self.editing = self.now.opened.clone();

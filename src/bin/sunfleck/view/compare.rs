@@ -11,7 +11,7 @@ use sunfleck::output::tonemap::ToneMap;
 
 use super::app::Viewer;
 use super::charts::short;
-use super::engine::{Comparison, Message, Painted, Reference, View};
+use super::engine::{Comparison, Message, Painted, Reference, View, is_same};
 use super::files;
 use super::inspect::{row, table};
 
@@ -109,11 +109,7 @@ impl Viewer {
     /// Says it of a reference that is new.
     pub fn look_at_reference(&mut self, ui: &egui::Ui) {
         let reference = self.now.reference.clone();
-        let is_same = match (&self.compare.seen, &reference) {
-            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
-            (None, None) => true,
-            _ => false,
-        };
+        let is_same = is_same(self.compare.seen.as_ref(), reference.as_ref());
         // The picture's size is known once there is a scene.
         if is_same || reference.is_some() && self.full_size().is_none() {
             return;

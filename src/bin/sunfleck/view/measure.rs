@@ -30,13 +30,13 @@ pub struct Plan {
     pub offscreen: bool,
 }
 
-/// Frames of one part, in their order, seconds.
+/// Frames of one part, in their order.
 #[derive(Clone, Debug, Default)]
 pub struct Frames {
     /// From one to the next, waiting for the display included.
-    pub intervals: Vec<f64>,
+    pub intervals: Vec<Duration>,
     /// Of the interface thread, without the waiting.
-    pub work: Vec<f64>,
+    pub work: Vec<Duration>,
     /// Iterations that came to their end meanwhile.
     pub iterations: u32,
 }
@@ -51,8 +51,8 @@ pub struct Figures {
     pub resting: Frames,
     /// It is turned by the pointer, again and again.
     pub turning: Frames,
-    /// From an input to the first picture of it, seconds.
-    pub waits: Vec<f64>,
+    /// From an input to the first picture of it.
+    pub waits: Vec<Duration>,
 }
 
 /// Opens a window, or what stands for one, that asks for frames as fast as the display takes them, and closes it by itself.
@@ -80,7 +80,7 @@ pub fn run(device: Device, plan: &Plan) -> Result<Figures> {
     if !matches!(observer.part, Part::Done) {
         bail!("the window was closed before its time");
     }
-    observer.figures.waits = viewer.timing.waits().map(|wait| wait.as_secs_f64()).collect();
+    observer.figures.waits = viewer.timing.waits().collect();
     Ok(observer.figures)
 }
 
@@ -137,8 +137,8 @@ impl Observer {
         };
         let now = Instant::now();
         if let Some(last) = self.last.replace(now) {
-            frames.intervals.push((now - last).as_secs_f64());
-            frames.work.extend(work.map(f64::from));
+            frames.intervals.push(now - last);
+            frames.work.extend(work.and_then(|seconds| Duration::try_from_secs_f32(seconds).ok()));
         }
         if let Some(frame) = &viewer.now.frame {
             let (estimate, n) = (frame.estimate, frame.film.n_iterations);
@@ -220,7 +220,8 @@ mod tests {
         for frames in [&figures.resting, &figures.turning] {
             assert!(!frames.intervals.is_empty() && frames.iterations > 0, "{frames:?}");
             // Work is part of the time between frames.
-            assert!(frames.work.iter().sum::<f64>() <= frames.intervals.iter().sum::<f64>() + 1.0, "{frames:?}");
+            let sum = |times: &[Duration]| times.iter().sum::<Duration>();
+            assert!(sum(&frames.work) <= sum(&frames.intervals) + Duration::from_secs(1), "{frames:?}");
         }
         assert!(!figures.waits.is_empty());
         let error = run(device(), &plan("nowhere.glb")).unwrap_err().to_string();

@@ -23,7 +23,7 @@ mod start;
 mod state;
 #[cfg(test)]
 mod tests;
-mod timing;
+pub mod timing;
 mod window;
 
 use std::process::ExitCode;

@@ -40,7 +40,7 @@ impl Timing {
     /// For people.
     pub fn text(&self) -> String {
         let text = |of: &VecDeque<Duration>| {
-            let ms = |part| percentile(of, part).as_secs_f64() * 1e3;
+            let ms = |part| percentile(of.iter().copied(), part).unwrap_or_default().as_secs_f64() * 1e3;
             format!("{:.1} ms, 95 % within {:.1} ms (of {})", ms(0.5), ms(0.95), of.len())
         };
         let mut lines = format!("The window's frames: {}", text(&self.frames));
@@ -58,12 +58,12 @@ fn push(times: &mut VecDeque<Duration>, time: Duration) {
     times.push_back(time);
 }
 
-/// The least that `part` of the times, from 0 to 1, do not exceed.
-fn percentile(times: &VecDeque<Duration>, part: f64) -> Duration {
-    let mut times: Vec<_> = times.iter().copied().collect();
+/// The least that `part` of the times, from 0 to 1, do not exceed; none of nothing.
+pub fn percentile(times: impl Iterator<Item = Duration>, part: f64) -> Option<Duration> {
+    let mut times: Vec<_> = times.collect();
     times.sort_unstable();
     let rank = (part * times.len() as f64).ceil() as usize;
-    times.get(rank.saturating_sub(1)).copied().unwrap_or_default()
+    times.get(rank.saturating_sub(1)).copied()
 }
 
 #[cfg(test)]
@@ -73,12 +73,13 @@ mod tests {
     #[test]
     fn percentiles_are_of_the_newest_frames() {
         let mut timing = Timing::default();
-        assert_eq!(percentile(&timing.frames, 0.95), Duration::ZERO);
+        let percentile = |timing: &Timing, part| percentile(timing.frames.iter().copied(), part);
+        assert_eq!(percentile(&timing, 0.95), None);
         (0..1000).for_each(|i| timing.frame(Duration::from_millis(i)));
         // 800 to 999.
-        assert_eq!(percentile(&timing.frames, 0.5), Duration::from_millis(899));
-        assert_eq!(percentile(&timing.frames, 0.95), Duration::from_millis(989));
-        assert_eq!(percentile(&timing.frames, 1.0), Duration::from_millis(999));
+        assert_eq!(percentile(&timing, 0.5), Some(Duration::from_millis(899)));
+        assert_eq!(percentile(&timing, 0.95), Some(Duration::from_millis(989)));
+        assert_eq!(percentile(&timing, 1.0), Some(Duration::from_millis(999)));
     }
 
     #[test]

@@ -241,6 +241,14 @@ impl Shared {
     }
 }
 
+/// Whether both are the same one, or neither is there.
+pub fn is_same<T>(a: Option<&Arc<T>>, b: Option<&Arc<T>>) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+        (a, b) => a.is_none() && b.is_none(),
+    }
+}
+
 /// Does `work`; a panic in it becomes an error, one line.
 pub fn catch<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     // What `work` may have left half done is thrown away by those who call this.

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use super::paint::{Painted, Painter, Painting, fitting};
-use super::{Board, Frame, Measured, Message, Reference, Shared, catch};
+use super::{Board, Frame, Measured, Message, Reference, Shared, catch, is_same};
 
 /// Until the interface is gone.
 pub fn run(shared: &Shared) {
@@ -94,13 +94,6 @@ fn publish(board: &mut Board, task: &Task, painted: Arc<Painted>, estimated: Opt
     // Another reference may have been set in the meantime.
     if let Some(rel_mse) = measured.filter(|_| is_same(task.reference.as_ref(), board.reference.as_ref())) {
         board.history.against_reference.push(point(rel_mse));
-    }
-}
-
-fn is_same(a: Option<&Arc<Reference>>, b: Option<&Arc<Reference>>) -> bool {
-    match (a, b) {
-        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
-        (a, b) => a.is_none() && b.is_none(),
     }
 }
 

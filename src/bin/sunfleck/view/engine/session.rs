@@ -19,8 +19,6 @@ use crate::job::Input;
 const PREVIEW: u32 = 4;
 /// Photon paths of a preview.
 const PREVIEW_PATHS: u32 = 20_000;
-/// A dispatch's, so that the window's frames find their place between them.
-const DISPATCH_SECONDS: f64 = 0.01;
 /// Between films that are read back.
 const SHOW_EVERY: Duration = Duration::from_millis(80);
 /// Iterations that are shown at once.
@@ -106,7 +104,7 @@ impl Session {
         interrupt: Interrupt,
     ) -> Result<Self> {
         let scene = device.pack(&input.scene, before)?;
-        let mut stages = device.stages_of(Arc::clone(&scene), &input, Some(DISPATCH_SECONDS))?;
+        let mut stages = device.stages_of(Arc::clone(&scene), &input)?;
         stages.set_interrupt(interrupt);
         let params = input.params.clone();
         Ok(Self {

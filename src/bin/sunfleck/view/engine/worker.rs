@@ -10,7 +10,7 @@ use sunfleck::ppm::Error;
 use sunfleck::scene::settings::Settings;
 
 use super::session::{Frame, Session};
-use super::{Board, Choice, Message, Opened, Phase, Save, Shared, Wanted, catch};
+use super::{Board, Choice, Message, Opened, Phase, Save, Shared, Wanted, catch, is_same};
 use crate::cli::InputArgs;
 use crate::devices::Device;
 use crate::job;
@@ -289,11 +289,7 @@ fn is_other_estimate(opened: &Opened, before: &Wanted, now: &Wanted) -> bool {
 
 /// Whether the settings leave the estimate as it is. Quick where they are the same.
 fn is_rendered_alike(opened: &Opened, before: &Wanted, now: &Wanted) -> bool {
-    let is_same = match (&before.settings, &now.settings) {
-        (Some(before), Some(now)) => Arc::ptr_eq(before, now),
-        (before, now) => before.is_none() && now.is_none(),
-    };
-    is_same || rendered(opened, before) == rendered(opened, now)
+    is_same(before.settings.as_ref(), now.settings.as_ref()) || rendered(opened, before) == rendered(opened, now)
 }
 
 /// Those settings that the estimate depends on.
