@@ -52,7 +52,7 @@ Examples:
   sunfleck bench kd --mesh eros.obj -o results
       Builders of kd-trees in the mesh check, over a mesh split and simplified from 1,000 to 140,296 faces.
   sunfleck bench view --backend gpu -o results
-      Whether the window stays smooth; needs a display.
+      Whether the window stays smooth; --offscreen where there is no display.
 
 Into the folder go NAME.json, NAME.csv and an .svg for each figure; the tables are printed too.";
 
