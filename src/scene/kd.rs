@@ -8,7 +8,8 @@ use crate::index::kd::{Error, FaceTree, KdOptions, KdTree, Triangles};
 use crate::layout::{PRIMITIVE_SPHERE, Primitive, SceneNode};
 
 /// What finds the primitives along a ray, on the CPU. The picture is the same with either.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Accelerator {
     /// Boxes around primitives.
     #[default]

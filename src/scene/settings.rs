@@ -35,10 +35,10 @@ mod values;
 pub use changes::{MaterialSettings, SceneLightSettings};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-pub use values::{Count, Direct, FirstRadius, Kernel, LightKind, Size, parse_count};
+pub use values::{Count, Direct, FirstRadius, Index, Kernel, LightKind, Size, parse_count};
 
-use super::Environment;
 use super::load::LoadError;
+use super::{Accelerator, Environment};
 
 /// Width and height of a picture, pixels, at most.
 pub const MAX_SIDE: u32 = 65_535;
@@ -71,6 +71,14 @@ pub struct Settings {
     /// Who brings light straight from a lamp: `"sampled"` or `"photons"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub direct: Option<Direct>,
+    /// What finds photons: `"tree"`, the default, or `"hardware"`, on a GPU with ray queries. The picture converges to the
+    /// same; a device that cannot goes by the default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub index: Option<Index>,
+    /// What finds the surface a ray meets: `"bvh"`, the default, or `"kd"`, on the CPU. The picture is the same; a device
+    /// that cannot goes by the default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accel: Option<Accelerator>,
     /// Stop after so many iterations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub iterations: Option<Count>,

@@ -529,6 +529,44 @@ fn both_accelerators_make_the_same_picture() {
     assert_eq!(difference.rel_mse, 0.0, "{difference:?}");
 }
 
+/// A file travels between machines: what it asks for and one of them cannot do is left, with a line that says so. Flags
+/// say over it.
+#[test]
+fn a_file_says_how_to_search_as_far_as_the_device_can() {
+    let folder = folder_with_floor();
+    let settings = "scene = \"floor.gltf\"\nphotons = \"2k\"\niterations = 2\nsize = [32, 16]\n";
+    fs::write(folder.path().join("kd.toml"), format!("{settings}accel = \"kd\"\n")).unwrap();
+    fs::write(folder.path().join("hardware.toml"), format!("{settings}index = \"hardware\"\n")).unwrap();
+    let render = |args: &str, used: &str, warnings: &[&str]| {
+        let output = sunfleck(folder.path(), words(&format!("render {args} -v -o a.exr")));
+        let text = stderr(&output);
+        assert!(output.status.success() && text.contains(used), "{args}: {text}");
+        let said: Vec<&str> = text.lines().filter(|line| line.contains("warning: ")).collect();
+        let are_they =
+            said.len() == warnings.len() && said.iter().zip(warnings).all(|(line, part)| line.contains(part));
+        assert!(are_they, "{args}: {said:?}");
+    };
+    render("kd.toml --backend cpu", "index: tree, accelerator: kd", &[]);
+    render("kd.toml --backend cpu --accel bvh", "accelerator: bvh", &[]);
+    render("kd.toml --backend cpu --set accel=bvh", "accelerator: bvh", &[]);
+    render("kd.toml --set accel=bvh --accel kd", "accelerator: kd", &[]);
+    render("hardware.toml --backend cpu", "index: tree", &["hardware.toml: index: "]);
+    render("hardware.toml --backend cpu --index tree", "index: tree", &[]);
+    let list = String::from_utf8(sunfleck(folder.path(), ["--list-devices"]).stdout).unwrap();
+    let adapters = list.lines().count() - 1;
+    if adapters > 0 {
+        render("kd.toml --backend gpu", "accelerator: bvh", &["kd.toml: accel: "]);
+        render("kd.toml --backend gpu --accel bvh", "accelerator: bvh", &[]);
+    }
+    if adapters == 1 && list.contains("ray queries") {
+        render("hardware.toml --backend gpu", "index: hardware", &[]);
+        render("hardware.toml --backend gpu --index tree", "index: tree", &[]);
+        render("hardware.toml --backend gpu --set index=", "index: tree", &[]);
+    } else if adapters == 1 {
+        render("hardware.toml --backend gpu", "index: tree", &["hardware.toml: index: "]);
+    }
+}
+
 #[cfg(feature = "gpu")]
 #[test]
 fn both_backends_make_the_same_picture() {

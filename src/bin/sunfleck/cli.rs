@@ -160,17 +160,25 @@ pub struct DeviceArgs {
     #[arg(long, value_name = "N|NAME", help_heading = "Device")]
     pub device: Option<String>,
 
-    /// How the GPU finds photons; hardware: by ray queries, where the adapter has them (see --list-devices)
-    #[arg(long, value_parser = ["tree", "hardware"], default_value = "tree", help_heading = "Device")]
-    pub index: String,
+    /// How the GPU finds photons; hardware: by ray queries, where the adapter has them (see --list-devices) [default: tree]
+    #[arg(long, value_parser = ["tree", "hardware"], help_heading = "Device")]
+    pub index: Option<String>,
 
-    /// How the CPU finds what a ray meets: boxes or planes, the same picture; kd chooses the CPU
-    #[arg(long, value_parser = ["bvh", "kd"], default_value = "bvh", help_heading = "Device")]
-    pub accel: String,
+    /// How the CPU finds what a ray meets: boxes or planes, the same picture; kd chooses the CPU [default: bvh]
+    #[arg(long, value_parser = ["bvh", "kd"], help_heading = "Device")]
+    pub accel: Option<String>,
 
     /// CPU threads [default: all]
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Device")]
     pub threads: Option<u16>,
+}
+
+impl DeviceArgs {
+    /// What the flags say over the settings, as `--set` takes it.
+    pub fn pairs(&self) -> Vec<String> {
+        let index = self.index.iter().map(|index| format!("index={index}"));
+        index.chain(self.accel.iter().map(|accel| format!("accel={accel}"))).collect()
+    }
 }
 
 #[cfg(feature = "view")]
@@ -477,13 +485,27 @@ mod tests {
     #[cfg(feature = "view")]
     #[test]
     fn flags_of_the_window_are_settings() {
-        let line =
-            ["sunfleck", "view", "glass", "-r", "64x48", "--photons", "2k", "--camera", "a \"b\"", "--env", "/x y.hdr"];
+        let line = [
+            "sunfleck",
+            "view",
+            "glass",
+            "-r",
+            "64x48",
+            "--photons",
+            "2k",
+            "--camera",
+            "a \"b\"",
+            "--env",
+            "/x y.hdr",
+            "--index",
+            "hardware",
+        ];
         let Some(Command::View(args)) = Cli::parse_from(line).command else { panic!("another command") };
         let mut settings = sunfleck::scene::settings::Settings::default();
-        for pair in args.pairs().unwrap() {
+        for pair in args.pairs().unwrap().into_iter().chain(args.device.pairs()) {
             settings.set(&pair).unwrap();
         }
+        assert_eq!(settings.to_toml().matches("index = \"hardware\"").count(), 1);
         assert_eq!(settings.size.map(|size| size.0), Some([64, 48]));
         assert_eq!(settings.photons.map(|n| n.0), Some(2000));
         assert_eq!(settings.camera.and_then(|camera| camera.name).as_deref(), Some("a \"b\""));

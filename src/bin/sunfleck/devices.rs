@@ -8,11 +8,13 @@ use sunfleck::cpu::CpuStages;
 #[cfg(feature = "gpu")]
 use sunfleck::gpu::{self, Choice, Context, GpuStages, Method};
 use sunfleck::ppm::Stages;
+use sunfleck::scene::settings::{Index, Settings};
 use sunfleck::scene::{Accelerator, PackedScene, Scene};
 
 use crate::cli::{DeviceArgs, Usage};
 use crate::job::Input;
 use crate::progress::Progress;
+use crate::scenes::Source;
 
 /// What will compute.
 pub enum Device {
@@ -21,47 +23,34 @@ pub enum Device {
     Gpu(Arc<Context>, Method),
 }
 
-/// How an open device searches.
-#[cfg(feature = "view")]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Search {
-    /// What finds photons; a CPU has but its tree.
-    pub index: Method,
-    /// What finds what a ray meets; a GPU has but its BVH.
-    pub accelerator: Accelerator,
-}
-
-#[cfg(feature = "view")]
-impl Search {
-    /// The command line's flags for what is not the default, each after a space.
-    pub fn flags(&self) -> &'static str {
-        match (self.index, self.accelerator) {
-            (Method::Hardware, _) => " --index hardware",
-            (Method::Tree, Accelerator::Kd) => " --accel kd",
-            (Method::Tree, Accelerator::Bvh) => "",
-        }
-    }
-}
-
 /// Limits the CPU's threads.
 pub fn use_threads(threads: Option<u16>) -> Result<()> {
     let builder = rayon::ThreadPoolBuilder::new().num_threads(threads.map_or(0, usize::from));
     builder.build_global().map_err(|e| anyhow!("--threads: {e}"))
 }
 
-/// Opens what was asked for.
+/// Opens what the flags ask for, to search as the settings of `source` say.
+pub fn open_for(args: &DeviceArgs, source: &Source, progress: &Progress) -> Result<Device> {
+    let mut device = open(args, progress)?;
+    device.cannot(source).iter().for_each(|warning| progress.say(&format!("sunfleck: warning: {warning}")));
+    device.follow(&source.settings)?;
+    Ok(device)
+}
+
+/// Opens what the flags ask for.
 pub fn open(args: &DeviceArgs, progress: &Progress) -> Result<Device> {
-    let accelerator = if args.accel == "kd" { Accelerator::Kd } else { Accelerator::Bvh };
+    let is_hardware = args.index.as_deref() == Some("hardware");
+    let accelerator = if args.accel.as_deref() == Some("kd") { Accelerator::Kd } else { Accelerator::Bvh };
     let cpu = match accelerator {
         Accelerator::Kd if args.backend == "gpu" => {
             bail!(Usage("--accel kd needs --backend cpu, a GPU goes by its BVH".into()))
         }
         Accelerator::Kd => "--accel kd",
         Accelerator::Bvh if args.backend == "cpu" => "--backend cpu",
-        Accelerator::Bvh => return open_gpu(args, progress),
+        Accelerator::Bvh => return open_gpu(args, is_hardware, progress),
     };
-    if args.index != "tree" {
-        bail!(Usage(format!("--index {} needs a GPU, {cpu} does without", args.index)));
+    if is_hardware {
+        bail!(Usage(format!("--index hardware needs a GPU, {cpu} does without")));
     }
     match &args.device {
         Some(device) => bail!(Usage(format!("--device {device} names a GPU, {cpu} does without"))),
@@ -99,17 +88,17 @@ pub fn has_real_gpu() -> bool {
 }
 
 #[cfg(not(feature = "gpu"))]
-fn open_gpu(args: &DeviceArgs, _: &Progress) -> Result<Device> {
-    match args.backend == "gpu" || args.device.is_some() || args.index != "tree" {
+fn open_gpu(args: &DeviceArgs, is_hardware: bool, _: &Progress) -> Result<Device> {
+    match args.backend == "gpu" || args.device.is_some() || is_hardware {
         true => bail!("this sunfleck was built without the GPU backend"),
         false => Ok(Device::Cpu(Accelerator::Bvh)),
     }
 }
 
 #[cfg(feature = "gpu")]
-fn open_gpu(args: &DeviceArgs, progress: &Progress) -> Result<Device> {
+fn open_gpu(args: &DeviceArgs, is_hardware: bool, progress: &Progress) -> Result<Device> {
     let devices = gpu::list_devices();
-    let method = if args.index == "hardware" { Method::Hardware } else { Method::Tree };
+    let method = if is_hardware { Method::Hardware } else { Method::Tree };
     let choice = match &args.device {
         Some(wanted) => {
             let index = wanted.parse().ok().filter(|&i: &usize| devices.iter().any(|d| d.index == i));
@@ -128,6 +117,12 @@ fn open_gpu(args: &DeviceArgs, progress: &Progress) -> Result<Device> {
         }
         Err(error) => Err(error.into()),
     }
+}
+
+/// The same adapter, opened once more.
+#[cfg(feature = "gpu")]
+fn reopened(context: &Context, method: Method) -> Result<Device> {
+    Ok(Device::Gpu(Arc::new(context_for(method, &Choice::Index(context.info().index))?), method))
 }
 
 /// An adapter opened with what the method needs.
@@ -167,47 +162,51 @@ impl Device {
         }
     }
 
-    /// Whether it has failed for good.
-    #[cfg(feature = "view")]
-    pub fn is_lost(&self) -> bool {
+    /// Whether it can find photons by ray queries.
+    pub fn has_ray_queries(&self) -> bool {
         match self {
             Self::Cpu(_) => false,
-            Self::Gpu(context, _) => context.check().is_err(),
+            #[cfg(feature = "gpu")]
+            Self::Gpu(context, _) => context.info().ray_queries,
         }
     }
 
-    /// How it searches.
-    #[cfg(feature = "view")]
-    pub fn search(&self) -> Search {
+    /// What the settings of `source` ask for and this device cannot do, a line each.
+    pub fn cannot(&self, source: &Source) -> Vec<String> {
+        let (settings, name) = (&source.settings, &source.name);
+        let device = self.gpu_name().unwrap_or_else(|| "the CPU".to_owned());
+        let index = settings.index == Some(Index::Hardware) && !self.has_ray_queries();
+        let accel = settings.accel == Some(Accelerator::Kd) && self.backend() != "cpu";
+        let index = index.then(|| format!("{name}: index: hardware needs ray queries, {device} has none: using tree"));
+        let accel = accel.then(|| format!("{name}: accel: kd is for the CPU, not for {device}: using bvh"));
+        index.into_iter().chain(accel).collect()
+    }
+
+    /// Searches as `settings` say from now on, by the default where it cannot; opened anew, if it must be.
+    pub fn follow(&mut self, settings: &Settings) -> Result<()> {
         match self {
-            Self::Cpu(accelerator) => Search { accelerator: *accelerator, ..Search::default() },
-            Self::Gpu(_, method) => Search { index: *method, ..Search::default() },
+            Self::Cpu(accelerator) => *accelerator = settings.accel.unwrap_or_default(),
+            #[cfg(feature = "gpu")]
+            Self::Gpu(context, method) => {
+                let is_hardware = settings.index == Some(Index::Hardware) && context.info().ray_queries;
+                let wanted = if is_hardware { Method::Hardware } else { Method::Tree };
+                if *method != wanted {
+                    *self = reopened(context, wanted)?;
+                }
+            }
         }
+        Ok(())
     }
 
-    /// All ways in which it can search, the default first.
+    /// Opens the adapter again, if this is one, and has failed for good.
     #[cfg(feature = "view")]
-    pub fn searches(&self) -> Vec<Search> {
-        let mut all = vec![Search::default()];
-        match self {
-            Self::Cpu(_) => all.push(Search { accelerator: Accelerator::Kd, ..Search::default() }),
-            Self::Gpu(context, _) if context.info().ray_queries => {
-                all.push(Search { index: Method::Hardware, ..Search::default() });
-            }
-            Self::Gpu(..) => {}
+    pub fn recover(&mut self) -> Result<()> {
+        if let Self::Gpu(context, method) = self
+            && context.check().is_err()
+        {
+            *self = reopened(context, *method)?;
         }
-        all
-    }
-
-    /// The same adapter, opened once more, to search so.
-    #[cfg(feature = "view")]
-    pub fn reopen(&self, search: Search) -> Result<Self> {
-        Ok(match self {
-            Self::Cpu(_) => Self::Cpu(search.accelerator),
-            Self::Gpu(context, _) => {
-                Self::Gpu(Arc::new(context_for(search.index, &Choice::Index(context.info().index))?), search.index)
-            }
-        })
+        Ok(())
     }
 
     /// What the adapter is called, if this is one.

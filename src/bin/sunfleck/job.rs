@@ -50,7 +50,8 @@ pub struct Job {
     pub budget: Budget,
     /// One radius for all pixels, the median of the automatic ones.
     pub one_radius: bool,
-    source: Source,
+    /// With what `--set`, `--index` and `--accel` say over its settings.
+    pub source: Source,
 }
 
 /// What the stages read.
@@ -69,6 +70,7 @@ impl Job {
         check_outputs(args)?;
         let mut source = Source::resolve(&scene_name)?;
         source.set(&args.set)?;
+        source.set(&args.device.pairs())?;
         let settings = &source.settings;
         let iterations = args.iterations.or(settings.iterations.map(|n| n.0));
         let budget = match (iterations, args.seconds.or(settings.seconds)) {

@@ -24,7 +24,7 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode> {
     devices::use_threads(args.device.threads)?;
     let mut seconds = Seconds::default();
     let mut progress = Progress::new(args.quiet);
-    let device = timed(&mut seconds.open, || devices::open(&args.device, &progress))?;
+    let device = timed(&mut seconds.open, || devices::open_for(&args.device, &job.source, &progress))?;
     let input = timed(&mut seconds.load, || job.load(args))?; // file → scene, camera, parameters
     input.warnings.iter().for_each(|warning| progress.say(&format!("sunfleck: warning: {}", crate::one_line(warning))));
     let mut stages = timed(&mut seconds.prepare, || device.stages(&input))?; // scene → device's memory

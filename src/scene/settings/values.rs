@@ -41,6 +41,17 @@ pub enum Direct {
     Photons,
 }
 
+/// What finds photons on a GPU. The picture is the same, up to the order in which photons are summed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Index {
+    /// Our own tree, on every device.
+    #[default]
+    Tree,
+    /// Ray queries, on adapters that have them.
+    Hardware,
+}
+
 /// The kinds of lights without extent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]

@@ -6,10 +6,10 @@ use proptest::option::of;
 use proptest::prelude::*;
 use serde_json::json;
 use sunfleck::scene::settings::{
-    CameraSettings, Count, Direct, EnvironmentSettings, FirstRadius, Kernel, LightKind, LightSettings,
+    CameraSettings, Count, Direct, EnvironmentSettings, FirstRadius, Index, Kernel, LightKind, LightSettings,
     MaterialSettings, SceneLightSettings, Settings, Size, SphereSettings,
 };
-use sunfleck::scene::{Camera, Projection, Scene};
+use sunfleck::scene::{Accelerator, Camera, Projection, Scene};
 
 /// Materials "floor", "lamp" and two of the name "twin", lights "bulb" and "sun".
 fn scene() -> Scene {
@@ -360,6 +360,8 @@ fn settings() -> impl Strategy<Value = Settings> {
         of(any::<u32>()),
         of(-8.0f32..8.0),
         of(prop_oneof![Just(Direct::Sampled), Just(Direct::Photons)]),
+        of(prop_oneof![Just(Index::Tree), Just(Index::Hardware)]),
+        of(prop_oneof![Just(Accelerator::Bvh), Just(Accelerator::Kd)]),
     );
     let list = 0..4usize;
     let lists = (
@@ -370,7 +372,7 @@ fn settings() -> impl Strategy<Value = Settings> {
     );
     (scalars, of(camera()), of(environment()), lists).prop_map(
         |(
-            (scene, size, photons, alpha, radius, seconds, seed, exposure, direct),
+            (scene, size, photons, alpha, radius, seconds, seed, exposure, direct, index, accel),
             camera,
             environment,
             (materials, scene_lights, spheres, lights),
@@ -384,6 +386,8 @@ fn settings() -> impl Strategy<Value = Settings> {
             seed,
             exposure,
             direct,
+            index,
+            accel,
             camera,
             environment,
             materials,

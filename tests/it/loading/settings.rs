@@ -3,8 +3,8 @@
 use super::{Folder, Glb};
 use glam::Vec3;
 use std::f32::consts::PI;
-use sunfleck::scene::settings::{Count, FirstRadius, Kernel, Settings, Size};
-use sunfleck::scene::{AlphaMode, Environment, Material, Projection, PunctualKind, Scene};
+use sunfleck::scene::settings::{Count, FirstRadius, Index, Kernel, Settings, Size};
+use sunfleck::scene::{Accelerator, AlphaMode, Environment, Material, Projection, PunctualKind, Scene};
 
 const FULL: &str = r#"
 scene = "scene.glb"
@@ -14,6 +14,8 @@ alpha = 0.7
 radius = "automatic"
 kernel = "constant"
 direct = "photons"
+index = "hardware"
+accel = "kd"
 iterations = 64
 seconds = 30
 seed = 7
@@ -59,6 +61,7 @@ fn everything_at_once() {
     let settings = Settings::load(&folder.write("scene.toml", FULL)).unwrap();
     assert_eq!((settings.size, settings.photons), (Some(Size([640, 480])), Some(Count(1_500_000))));
     assert_eq!((settings.radius, settings.kernel), (Some(FirstRadius::Automatic), Some(Kernel::Constant)));
+    assert_eq!((settings.index, settings.accel), (Some(Index::Hardware), Some(Accelerator::Kd)));
     let mut scene = Glb::triangle().scene();
     let warnings = settings.apply_to_scene(&mut scene, folder.0.path()).unwrap();
     assert!(warnings.is_empty());
@@ -87,6 +90,8 @@ fn errors_name_file_line_and_field() {
         ("size = [0, 10]\n", ["scene.toml:1:", "size", "0 × 10"]),
         ("size = [1]\n", ["scene.toml:1:", "size", "length"]),
         ("kernel = \"gauss\"\n", ["scene.toml:1:", "kernel", "gauss"]),
+        ("index = \"grid\"\n", ["scene.toml:1:", "index", "expected `tree` or `hardware`"]),
+        ("accel = \"grid\"\n", ["scene.toml:1:", "accel", "expected `bvh` or `kd`"]),
         ("radius = -1\n", ["scene.toml:1:", "radius", "-1"]),
         ("alpha = 1.0\n", ["scene.toml:1:", "alpha", "1"]),
         ("[camera]\nup = [0, 0, 0]\n", ["scene.toml:2:", "camera.up", "direction"]),
@@ -116,6 +121,8 @@ fn overrides() {
         "camera.position=[1, 2, 3]",
         "radius=0.01",
         "kernel=constant",
+        "index=hardware",
+        "accel=bvh",
         "scene=my scene.glb",
     ] {
         settings.set(assignment).unwrap();
@@ -124,11 +131,14 @@ fn overrides() {
     assert_eq!((camera.yfov_degrees, camera.position), (Some(40.0), Some([1.0, 2.0, 3.0])));
     assert_eq!((settings.photons, settings.size), (Some(Count(2_000_000)), Some(Size([800, 600]))));
     assert_eq!(settings.radius, Some(FirstRadius::Fixed(0.01)));
+    assert_eq!((settings.index, settings.accel), (Some(Index::Hardware), Some(Accelerator::Bvh)));
     assert_eq!(settings.scene.as_deref(), Some("my scene.glb"));
     let before = settings.clone();
     for (assignment, part) in [
         ("photons", "field=value"),
         ("photons=few", "few"),
+        ("index=grid", "index: unknown variant `grid`, expected `tree` or `hardware`"),
+        ("accel=grid", "accel: unknown variant `grid`, expected `bvh` or `kd`"),
         ("camera.fov=40", "fov"),
         ("camera.yfov_degrees=0", "camera.yfov_degrees"),
         ("sphere.0.radius=1", "sphere"),

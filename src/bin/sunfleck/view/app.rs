@@ -15,7 +15,6 @@ use super::files;
 use super::picture::PictureView;
 use super::state::{Edits, Remembered};
 use crate::cli::{Usage, ViewArgs};
-use crate::devices::Search;
 use crate::scenes::Source;
 
 /// Key of what is remembered.
@@ -27,6 +26,8 @@ const MESSAGE_SECONDS: f64 = 6.0;
 #[derive(Clone, Debug, Default)]
 pub struct First {
     pub choice: Option<Choice>,
+    /// `key=value`, over the settings of every scene.
+    pub always: Vec<String>,
     pub limits: Limits,
     /// Where saving goes without asking.
     pub output: Option<PathBuf>,
@@ -41,8 +42,9 @@ impl First {
         }
         let mut set = args.set.clone();
         set.extend(args.pairs()?);
+        let always = args.device.pairs();
         let choice = match &args.scene {
-            Some(name) => Some(Choice { name: name.clone(), set }),
+            Some(name) => Some(Choice { name: name.clone(), set: [set, always.clone()].concat() }),
             None if set.is_empty() => None,
             None => bail!(Usage(format!("{}: of which scene? sunfleck view SCENE", set[0]))),
         };
@@ -51,7 +53,7 @@ impl First {
             Source::resolve(&choice.name)?.set(&choice.set)?;
         }
         let limits = Limits { iterations: args.iterations, seconds: args.seconds, noise: args.noise };
-        Ok(Self { choice, limits, output: args.output.clone(), reference: args.reference.clone() })
+        Ok(Self { choice, always, limits, output: args.output.clone(), reference: args.reference.clone() })
     }
 }
 
@@ -76,6 +78,8 @@ pub struct Viewer {
     pub timing: super::timing::Timing,
     /// What was open before.
     pub previous: Option<Arc<Choice>>,
+    /// Of [`First`].
+    always: Vec<String>,
     /// Of a texture, pixels.
     most_side: usize,
     /// Of the window.
@@ -95,13 +99,13 @@ pub struct Viewer {
 
 impl Viewer {
     pub fn new(engine: Engine, wake: Wake, first: First) -> Self {
-        let (now, search) = (engine.now(), engine.search());
-        let wanted = Wanted { scene: first.choice.map(Arc::new), search, limits: first.limits, ..Wanted::default() };
+        let now = engine.now();
+        let wanted = Wanted { scene: first.choice.map(Arc::new), limits: first.limits, ..Wanted::default() };
         Self {
             engine,
             wanted,
             now,
-            edits: Edits::new(Settings::default(), search),
+            edits: Edits::default(),
             remembered: Remembered::default(),
             entered: false,
             picture: PictureView::default(),
@@ -111,6 +115,7 @@ impl Viewer {
             convergence: Default::default(),
             timing: Default::default(),
             previous: None,
+            always: first.always,
             most_side: 0,
             title: String::new(),
             messages: vec![],
@@ -150,7 +155,7 @@ impl Viewer {
         if self.editing.is_some() {
             self.previous = self.wanted.scene.clone();
         }
-        self.wanted.scene = Some(Arc::new(Choice { name: name.into(), set: vec![] }));
+        self.wanted.scene = Some(Arc::new(Choice { name: name.into(), set: self.always.clone() }));
         self.wanted.settings = None;
         self.wanted.reloads += 1;
     }
@@ -208,16 +213,10 @@ impl Viewer {
         self.change_edits(Edits::redo);
     }
 
-    /// Searches otherwise, from now on.
-    pub fn search_by(&mut self, search: Search) {
-        self.change_edits(|edits| edits.set_search(search));
-    }
-
     /// Not while a scene is being read: the settings are those of no other.
     fn change_edits(&mut self, change: impl FnOnce(&mut Edits)) {
         if self.editing.is_some() {
             change(&mut self.edits);
-            self.wanted.search = self.edits.search();
             self.wanted.settings = Some(Arc::clone(self.edits.now()));
         }
     }
@@ -261,7 +260,7 @@ impl Viewer {
     pub fn command(&self) -> Option<String> {
         let opened = self.editing.as_ref()?;
         let iterations = self.now.frame.as_ref().map_or(1, |frame| frame.film.n_iterations);
-        Some(opened.command(self.edits.now(), self.edits.search(), iterations, Path::new("picture.exr")))
+        Some(opened.command(self.edits.now(), self.engine.backend(), iterations, Path::new("picture.exr")))
     }
 
     /// What is open.
@@ -383,7 +382,7 @@ impl Viewer {
             if let Some(opened) = &self.editing {
                 self.remembered.opened(&opened.source.name);
                 if !is_reload {
-                    self.edits = Edits::new(opened.source.settings.clone(), self.edits.search());
+                    self.edits = Edits::new(opened.source.settings.clone());
                     self.wanted.painting.look.exposure = opened.source.settings.exposure;
                     self.picture = PictureView::default();
                 }

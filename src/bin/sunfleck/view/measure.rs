@@ -7,7 +7,7 @@ use eframe::egui;
 use egui::{Event, Modifiers, PointerButton, Pos2, vec2};
 
 use super::app::{First, Viewer};
-use super::engine::{Choice, Engine, Limits, Phase};
+use super::engine::{Choice, Engine, Phase};
 use super::window::{self, Bell, Drawn, Guest};
 use crate::devices::Device;
 
@@ -64,8 +64,10 @@ pub fn run(device: Device, plan: &Plan) -> Result<Figures> {
         options.persistence_path = Some(folder.path().join("window.ron"));
         options
     };
-    let choice = Choice { name: plan.scene.clone(), set: plan.set.clone() };
-    let first = First { choice: Some(choice), limits: Limits::default(), output: None, reference: None };
+    // The device as it was opened, whatever the scene's file says.
+    let searched = [format!("index={}", device.index()), format!("accel={}", device.accelerator())];
+    let choice = Choice { name: plan.scene.clone(), set: [&searched, &plan.set[..]].concat() };
+    let first = First { choice: Some(choice), ..First::default() };
     let bell = Bell::default();
     let engine = Engine::start(device, bell.wake())?;
     let mut viewer = Viewer::new(engine, bell.wake(), first);

@@ -7,26 +7,17 @@ use serde::{Deserialize, Serialize};
 use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::settings::Settings;
 
-use crate::devices::Search;
-
 /// Files that are remembered.
 const MOST_RECENT: usize = 12;
 /// Steps that can be undone.
 const MOST_UNDONE: usize = 256;
 
-/// What can be edited.
-#[derive(Clone, Debug, Default)]
-struct Edited {
-    settings: Arc<Settings>,
-    search: Search,
-}
-
 /// Settings, and how to go back to what they were.
 #[derive(Clone, Debug, Default)]
 pub struct Edits {
-    now: Edited,
-    undo: Vec<Edited>,
-    redo: Vec<Edited>,
+    now: Arc<Settings>,
+    undo: Vec<Arc<Settings>>,
+    redo: Vec<Arc<Settings>>,
     /// What the last edit was of, and when: a drag is one step.
     last: Option<(&'static str, f64)>,
 }
@@ -35,47 +26,28 @@ impl Edits {
     /// Edits of the same thing within so many seconds are one step.
     const ONE_STEP: f64 = 0.7;
 
-    pub fn new(settings: Settings, search: Search) -> Self {
-        Self { now: Edited { settings: Arc::new(settings), search }, ..Self::default() }
+    pub fn new(settings: Settings) -> Self {
+        Self { now: Arc::new(settings), ..Self::default() }
     }
 
     pub fn now(&self) -> &Arc<Settings> {
-        &self.now.settings
-    }
-
-    pub fn search(&self) -> Search {
-        self.now.search
-    }
-
-    /// Searches otherwise: a step of its own.
-    pub fn set_search(&mut self, search: Search) {
-        if search != self.now.search {
-            self.push(Edited { search, ..self.now.clone() });
-            self.last = None;
-        }
-    }
-
-    fn push(&mut self, edited: Edited) {
-        self.undo.push(std::mem::replace(&mut self.now, edited));
-        if self.undo.len() > MOST_UNDONE {
-            self.undo.remove(0);
-        }
-        self.redo.clear();
+        &self.now
     }
 
     /// Replaces the settings; `what` is edited at `time`, seconds.
     pub fn set(&mut self, what: &'static str, time: f64, settings: Settings) {
-        if settings == *self.now.settings {
+        if settings == *self.now {
             return;
         }
-        let edited = Edited { settings: Arc::new(settings), search: self.now.search };
+        let before = std::mem::replace(&mut self.now, Arc::new(settings));
         let goes_on = self.last.is_some_and(|(last, when)| last == what && time - when < Self::ONE_STEP);
-        if goes_on {
-            self.redo.clear();
-            self.now = edited;
-        } else {
-            self.push(edited);
+        if !goes_on {
+            self.undo.push(before);
+            if self.undo.len() > MOST_UNDONE {
+                self.undo.remove(0);
+            }
         }
+        self.redo.clear();
         self.last = Some((what, time));
     }
 
@@ -153,7 +125,7 @@ mod tests {
 
     #[test]
     fn a_drag_is_one_step() {
-        let mut edits = Edits::new(with_alpha(0.1), Search::default());
+        let mut edits = Edits::new(with_alpha(0.1));
         for i in 0..10 {
             edits.set("alpha", 0.1 * f64::from(i), with_alpha(0.2 + 0.01 * i as f32));
         }

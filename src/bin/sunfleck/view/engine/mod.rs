@@ -31,7 +31,7 @@ pub use paint::{Comparison, Insides, Legend, Painted, Painting, Values, View};
 pub use session::Frame;
 use worker::Work;
 
-use crate::devices::{Device, Search};
+use crate::devices::Device;
 use crate::scenes::Source;
 
 /// Called when there is something new to look at.
@@ -63,8 +63,6 @@ pub struct Wanted {
     pub reloads: u32,
     /// In the place of those that the scene was opened with.
     pub settings: Option<Arc<Settings>>,
-    /// At first as [`Engine::search`] says; otherwise, the device is opened anew.
-    pub search: Search,
     /// The camera is moving: quick previews instead of the picture.
     pub moving: bool,
     /// Counts restarts.
@@ -119,14 +117,14 @@ impl Opened {
         self.loaded.scene.bounds().into_iter().chain(spheres).reduce(union).unwrap_or([-0.5, 0.5].map(Vec3::splat))
     }
 
-    /// What renders this scene with `settings` on the command line, searching so.
-    pub fn command(&self, settings: &Settings, search: Search, iterations: u32, output: &Path) -> String {
+    /// What renders this scene with `settings` on the command line; `backend` as [`Device::backend`] says.
+    pub fn command(&self, settings: &Settings, backend: &str, iterations: u32, output: &Path) -> String {
         let mut command = format!("sunfleck render {}", crate::render::quote(&self.source.name));
         for pair in settings.difference(&self.read) {
             command += &format!(" --set {}", crate::render::quote(&pair));
         }
         let output = crate::render::quote(&output.to_string_lossy());
-        format!("{command}{} --iterations {} -o {output}", search.flags(), iterations.max(1))
+        format!("{command} --backend {backend} --iterations {} -o {output}", iterations.max(1))
     }
 }
 
@@ -275,8 +273,8 @@ pub struct Now {
 /// The interface's end.
 pub struct Engine {
     shared: Arc<Shared>,
-    search: Search,
-    searches: Vec<Search>,
+    backend: &'static str,
+    has_ray_queries: bool,
     threads: Vec<JoinHandle<()>>,
 }
 
@@ -291,24 +289,24 @@ impl Engine {
             #[cfg(test)]
             asks: Arc::default(),
         });
-        let (search, searches) = (device.search(), device.searches());
+        let (backend, has_ray_queries) = (device.backend(), device.has_ray_queries());
         let named = |name: &str| std::thread::Builder::new().name(name.to_owned());
         let (render, paint) = (Arc::clone(&shared), Arc::clone(&shared));
         let threads = vec![
             named("render").spawn(move || worker::run(&render, device))?,
             named("paint").spawn(move || painting::run(&paint))?,
         ];
-        Ok(Self { shared, search, searches, threads })
+        Ok(Self { shared, backend, has_ray_queries, threads })
     }
 
-    /// How the device searched when the engine was started.
-    pub fn search(&self) -> Search {
-        self.search
+    /// `cpu` or `gpu`.
+    pub fn backend(&self) -> &'static str {
+        self.backend
     }
 
-    /// All ways in which it can.
-    pub fn searches(&self) -> &[Search] {
-        &self.searches
+    /// Whether the device can find photons by ray queries.
+    pub fn has_ray_queries(&self) -> bool {
+        self.has_ray_queries
     }
 
     /// Says what is wanted from now on.

@@ -12,7 +12,7 @@ use sunfleck::scene::PackedScene;
 use sunfleck::scene::settings::Settings;
 
 use super::{Insides, Opened, Record, Wanted};
-use crate::devices::{Device, Search};
+use crate::devices::Device;
 use crate::job::Input;
 
 /// Of the picture's width and height, while the camera moves.
@@ -38,7 +38,8 @@ pub struct Frame {
     /// What it is an estimate of.
     pub opened: Arc<Opened>,
     pub settings: Arc<Settings>,
-    pub search: Search,
+    /// `cpu` or `gpu`.
+    pub backend: &'static str,
     /// `[h·w]`, metres.
     pub first_radii: Arc<Vec<f32>>,
     /// Read back only where something shown needs it.
@@ -76,7 +77,7 @@ pub struct Session {
     /// What `input` was made with.
     pub settings: Arc<Settings>,
     scene: Arc<PackedScene>,
-    search: Search,
+    backend: &'static str,
     stages: Box<dyn Stages>,
     estimate: u64,
     params: Params,
@@ -112,7 +113,7 @@ impl Session {
             input,
             settings,
             scene,
-            search: device.search(),
+            backend: device.backend(),
             stages,
             estimate: 0,
             params,
@@ -228,7 +229,7 @@ impl Session {
             scene: Arc::clone(&self.scene),
             opened: Arc::clone(&self.opened),
             settings: Arc::clone(&self.settings),
-            search: self.search,
+            backend: self.backend,
             first_radii: self.radii.clone().unwrap_or_default(),
             insides: None,
             first_radius: self.first_radius,

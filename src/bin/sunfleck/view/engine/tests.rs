@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use sunfleck::cpu::CpuStages;
 use sunfleck::output::exr;
 use sunfleck::ppm::{self, Film, Stages};
-use sunfleck::scene::settings::{CameraSettings, Count};
+use sunfleck::scene::settings::{CameraSettings, Count, Index};
 use sunfleck::scene::{Accelerator, PackedScene};
 
 use super::*;
@@ -336,37 +336,74 @@ fn a_lost_device_is_opened_again() {
 }
 
 /// Opens the scene on `device`, has it searched in the other way, and returns both films.
-fn searched_in_both_ways(device: Device) -> [Film; 2] {
+fn searched_in_both_ways(device: Device, other: &str) -> [Film; 2] {
     let mut bench = Bench::open_on(device, "cornell", until(2));
     let before = bench.wait_for_film(&Phase::Reached, 2);
-    let [first, other] = bench.engine.searches()[..] else { panic!("{:?}", bench.engine.searches()) };
-    assert_eq!(bench.engine.search(), first);
-    bench.wanted.search = other;
-    bench.send();
+    bench.set(|settings| settings.set(other).unwrap());
     let after = bench.wait("another estimate", |now| {
         now.estimate > before.estimate && now.phase == Phase::Reached && iterations(now) == Some(2)
     });
     let frame = after.frame.unwrap();
-    let command = frame.opened.command(&frame.settings, frame.search, 2, Path::new("a.exr"));
-    assert!(command.contains(other.flags()) && !other.flags().is_empty(), "{command}");
+    let command = frame.opened.command(&frame.settings, frame.backend, 2, Path::new("a.exr"));
+    let backend = bench.engine.backend();
+    assert!(
+        command.contains(&format!(" --backend {backend} ")) && command.contains(&format!(" --set {other} ")),
+        "{command}"
+    );
     [before.frame.unwrap(), frame].map(|frame| frame.film.as_ref().clone())
 }
 
 #[test]
 fn another_way_to_search_finds_the_same_picture() {
-    let [bvh, kd] = searched_in_both_ways(Device::Cpu(Accelerator::Bvh));
+    let [bvh, kd] = searched_in_both_ways(Device::Cpu(Accelerator::Bvh), "accel=kd");
     assert_eq!(bvh.pixels, kd.pixels);
+}
+
+/// On a GPU where there is one, too.
+#[test]
+fn a_file_of_another_machine_is_searched_by_the_default() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("other.toml");
+    let gpu = crate::devices::open_backend("gpu").ok();
+    for device in [Some(Device::Cpu(Accelerator::Bvh)), gpu].into_iter().flatten() {
+        let (is_cpu, has_ray_queries) = (device.backend() == "cpu", device.has_ray_queries());
+        std::fs::write(&path, "scene = \"cornell\"\naccel = \"kd\"\nindex = \"hardware\"\n").unwrap();
+        let mut bench = Bench::open_on(device, &path.to_string_lossy(), until(2));
+        let now = bench.wait_for_film(&Phase::Reached, 2);
+        let accelerator = now.frame.unwrap().scene.accelerator();
+        assert_eq!(accelerator, if is_cpu { Accelerator::Kd } else { Accelerator::Bvh });
+        // Said once, whatever else is changed.
+        bench.set(|settings| settings.light_scale = Some(2.0));
+        bench.wait("another estimate", |later| later.estimate > now.estimate && later.phase == Phase::Reached);
+        let warnings = bench.engine.take_messages();
+        for (key, is_missed) in [("other.toml: index:", !has_ray_queries), ("other.toml: accel:", !is_cpu)] {
+            let is_it = |message: &&Message| matches!(message, Message::Warning(text) if text.contains(key));
+            assert_eq!(warnings.iter().filter(is_it).count(), usize::from(is_missed), "{key} {warnings:?}");
+        }
+        // Another scene has nothing of it.
+        bench.wanted.settings = None;
+        bench.choose("cornell", &["size=32x32", "photons=2000"]);
+        let next = bench.wait("another scene", |now| {
+            now.opened.as_ref().is_some_and(|opened| opened.source.name == "cornell") && now.phase == Phase::Reached
+        });
+        assert_eq!(next.frame.unwrap().scene.accelerator(), Accelerator::Bvh);
+        assert!(bench.engine.take_messages().is_empty());
+    }
 }
 
 #[test]
 fn ray_queries_find_the_same_picture() {
-    let device = crate::devices::open_backend("gpu").ok().filter(|device| device.searches().len() > 1);
-    let Some(device) = device else {
+    let device = crate::devices::open_backend("gpu").ok().filter(Device::has_ray_queries);
+    let Some(mut device) = device else {
         let required = std::env::var_os("SUNFLECK_REQUIRE_RAY_QUERY").is_some();
         assert!(!required, "SUNFLECK_REQUIRE_RAY_QUERY is set, but there are none");
         return;
     };
-    let [tree, hardware] = searched_in_both_ways(device).map(|film| film.rgb());
+    for index in [Index::Hardware, Index::Tree] {
+        device.follow(&Settings { index: Some(index), ..Settings::default() }).unwrap();
+        assert_eq!(device.index() == "hardware", index == Index::Hardware);
+    }
+    let [tree, hardware] = searched_in_both_ways(device, "index=hardware").map(|film| film.rgb());
     let sum = |of: &[[f32; 3]]| of.as_flattened().iter().map(|x| f64::from(x.abs())).sum::<f64>();
     let apart: Vec<[f32; 3]> = tree.iter().zip(&hardware).map(|(a, b)| [0, 1, 2].map(|i| a[i] - b[i])).collect();
     assert!(sum(&apart) < 1e-5 * sum(&tree), "{} of {}", sum(&apart), sum(&tree));

@@ -113,13 +113,8 @@ impl Have {
         let is_other_scene = is_other_scene(&self.wanted, wanted) || is_retry && self.opened.is_none();
         let is_stale = self.is_stale(wanted);
         let before = std::mem::replace(&mut self.wanted, wanted.clone());
-        if is_retry && device.is_lost() {
-            *device = device.reopen(device.search())?;
-        }
-        if device.search() != wanted.search && (is_retry || is_other_scene || before.search != wanted.search) {
-            // The memory of the old one first.
-            self.session = None;
-            *device = device.reopen(wanted.search)?;
+        if is_retry {
+            device.recover()?;
         }
         if is_other_scene {
             // The memory of the old one first.
@@ -135,6 +130,7 @@ impl Have {
             let opened = Arc::new(open(choice)?);
             self.opened = Some(Arc::clone(&opened));
             shared.update(|board| {
+                board.messages.extend(device.cannot(&opened.source).into_iter().map(Message::Warning));
                 board.opened = Some(opened);
             });
             return self.prepare(shared, device, wanted);
@@ -154,7 +150,7 @@ impl Have {
     }
 
     /// Applies the settings, as far as possible to the scene that the device has.
-    fn prepare(&mut self, shared: &Shared, device: &Device, wanted: &Wanted) -> Result<()> {
+    fn prepare(&mut self, shared: &Shared, device: &mut Device, wanted: &Wanted) -> Result<()> {
         let Some(opened) = self.opened.clone() else { return Ok(()) };
         let settings = wanted.settings.as_deref().unwrap_or(&opened.source.settings).clone();
         let is_same_scene = |session: &Session| {
@@ -169,6 +165,7 @@ impl Have {
                 let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
                 shared.update(|board| board.phase = Phase::Preparing);
                 let before = self.session.take().map(Session::into_scene); // Its memory first.
+                device.follow(&settings)?;
                 let warnings: Vec<_> = input.warnings.iter().cloned().map(Message::Warning).collect();
                 let (settings, interrupt) = (Arc::new(settings), shared.interrupt());
                 let session = Session::new(device, opened, settings, input, before.as_deref(), interrupt)?;
@@ -283,8 +280,7 @@ fn is_other_scene(before: &Wanted, now: &Wanted) -> bool {
 
 /// Whether the estimate that was wanted before is not the one wanted now, of the same scene.
 fn is_other_estimate(opened: &Opened, before: &Wanted, now: &Wanted) -> bool {
-    (before.moving, before.restarts, before.search) != (now.moving, now.restarts, now.search)
-        || !is_rendered_alike(opened, before, now)
+    (before.moving, before.restarts) != (now.moving, now.restarts) || !is_rendered_alike(opened, before, now)
 }
 
 /// Whether the settings leave the estimate as it is. Quick where they are the same.
@@ -298,7 +294,7 @@ fn rendered(opened: &Opened, wanted: &Wanted) -> Settings {
     Settings { exposure: None, iterations: None, seconds: None, ..settings.clone() }
 }
 
-/// Those settings that change the scene: not the camera, not the estimator's.
+/// Those settings that change the scene or how it is searched: not the camera, not the rest of the estimator's.
 fn of_scene(settings: &Settings) -> Settings {
     Settings {
         size: None,
@@ -325,7 +321,7 @@ pub fn write(save: &Save, frame: &Frame, adapter: String) -> Result<u32> {
     } else {
         let header = output::exr::Header {
             scene: frame.opened.source.name.clone(),
-            command: frame.opened.command(&frame.settings, frame.search, film.n_iterations, &save.path),
+            command: frame.opened.command(&frame.settings, frame.backend, film.n_iterations, &save.path),
             adapter,
             seed: params.seed,
             alpha: params.alpha,

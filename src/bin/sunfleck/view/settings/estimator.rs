@@ -2,13 +2,11 @@
 
 use eframe::egui;
 use egui::Ui;
-use sunfleck::gpu::Method;
 use sunfleck::ppm::Params;
 use sunfleck::scene::Accelerator;
-use sunfleck::scene::settings::{Count, Direct, FirstRadius, Kernel, Settings};
+use sunfleck::scene::settings::{Count, Direct, FirstRadius, Index, Kernel, Settings};
 
 use super::widgets::{Name, choice, count_of, count_text, metres, rounded, row, slider};
-use crate::devices::Search;
 use crate::view::app::Viewer;
 
 const PHOTONS: Name = Name {
@@ -40,12 +38,32 @@ const SEED: Name =
     Name { name: "Seed", hint: "Another seed, other noise; the same seed, the same picture. Restarts the estimate." };
 const INDEX: Name = Name {
     name: "Index",
-    hint: "What finds the photons near a point: a GPU with ray queries has a choice. Restarts the estimate.",
+    hint: "What finds the photons near a point: a GPU with ray queries has a choice. The picture converges to the same. \
+           Kept in the settings; a device without the choice goes by the tree. Restarts the estimate.",
 };
 const ACCELERATOR: Name = Name {
     name: "Accelerator",
-    hint: "What finds the surface a ray meets: the CPU has a choice. The picture is the same. Restarts the estimate.",
+    hint: "What finds the surface a ray meets: the CPU has a choice. The picture is the same. Kept in the settings; a GPU \
+           goes by boxes. Restarts the estimate.",
 };
+
+/// Values, the default first; names and hints.
+type Values<T> = [(T, &'static str, &'static str); 2];
+
+const KERNELS: Values<Kernel> = [
+    (Kernel::Epanechnikov, "Epanechnikov", "Falls to nothing at the radius: less blur."),
+    (Kernel::Constant, "Constant", "The same everywhere within the radius."),
+];
+const DIRECTS: Values<Direct> = [
+    (Direct::Sampled, "Sampled", "Lamps are sampled where the eye path ends: sharp shadows at once."),
+    (Direct::Photons, "Photons", "Photons bring all light, as in the literature."),
+];
+const INDICES: Values<Index> = [
+    (Index::Tree, "Tree", "Sunfleck's own tree over the photons."),
+    (Index::Hardware, "Ray queries", "The ray tracing hardware of the graphics card."),
+];
+const ACCELERATORS: Values<Accelerator> =
+    [(Accelerator::Bvh, "Boxes (bvh)", "A bounding volume hierarchy."), (Accelerator::Kd, "Planes (kd)", "A kd-tree.")];
 
 pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     let now = &*viewer.settings();
@@ -86,70 +104,38 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
 
     radius(ui, viewer, read, now);
 
-    let mut kernel = now.kernel.unwrap_or(Kernel::Epanechnikov);
-    let mut changed = false;
-    let reset = row(ui, KERNEL, now.kernel != read.kernel, |ui| {
-        let all = [
-            (Kernel::Epanechnikov, "Epanechnikov", "Falls to nothing at the radius: less blur."),
-            (Kernel::Constant, "Constant", "The same everywhere within the radius."),
-        ];
-        let response = choice(ui, "kernel", &mut kernel, &all);
-        changed = response.changed();
-        response
-    });
-    if changed {
-        viewer.edit(ui, "kernel", |s| s.kernel = Some(kernel));
-    }
-    if reset {
-        viewer.reset(ui, |s| s.kernel = read.kernel);
-    }
-
-    let mut direct = now.direct.unwrap_or(Direct::Sampled);
-    let mut changed = false;
-    let reset = row(ui, DIRECT, now.direct != read.direct, |ui| {
-        let all = [
-            (Direct::Sampled, "Sampled", "Lamps are sampled where the eye path ends: sharp shadows at once."),
-            (Direct::Photons, "Photons", "Photons bring all light, as in the literature."),
-        ];
-        let response = choice(ui, "direct", &mut direct, &all);
-        changed = response.changed();
-        response
-    });
-    if changed {
-        viewer.edit(ui, "direct", |s| s.direct = Some(direct));
-    }
-    if reset {
-        viewer.reset(ui, |s| s.direct = read.direct);
-    }
-
+    pick(ui, viewer, KERNEL, &KERNELS, [now.kernel, read.kernel], |s, kernel| s.kernel = kernel);
+    pick(ui, viewer, DIRECT, &DIRECTS, [now.direct, read.direct], |s, direct| s.direct = direct);
     numbers(ui, viewer, read, now);
 
-    search(ui, viewer, INDEX, |search| match search.index {
-        Method::Tree => ("Tree", "Sunfleck's own tree over the photons."),
-        Method::Hardware => ("Ray queries", "The ray tracing hardware of the graphics card."),
-    });
-    search(ui, viewer, ACCELERATOR, |search| match search.accelerator {
-        Accelerator::Bvh => ("Boxes (bvh)", "A bounding volume hierarchy."),
-        Accelerator::Kd => ("Planes (kd)", "A kd-tree."),
-    });
+    let indices = if viewer.engine().has_ray_queries() { &INDICES[..] } else { &INDICES[..1] };
+    pick(ui, viewer, INDEX, indices, [now.index, read.index], |s, index| s.index = index);
+    let accelerators = if viewer.engine().backend() == "cpu" { &ACCELERATORS[..] } else { &ACCELERATORS[..1] };
+    pick(ui, viewer, ACCELERATOR, accelerators, [now.accel, read.accel], |s, accel| s.accel = accel);
 }
 
-/// The ways to search that the device has, as far as `words` tells them apart; back is the way it was opened with.
-fn search(ui: &mut Ui, viewer: &mut Viewer, name: Name, words: fn(&Search) -> (&'static str, &'static str)) {
-    let mut all: Vec<_> = viewer.engine().searches().iter().map(|s| (*s, words(s).0, words(s).1)).collect();
-    all.dedup_by_key(|(_, word, _)| *word);
-    let (was, now) = (viewer.engine().search(), viewer.edits.search());
-    let of_now = |(_, word, _): &&(Search, &str, &str)| *word == words(&now).0;
-    let before = all.iter().find(of_now).map_or(now, |(search, ..)| *search);
-    let mut chosen = before;
-    let reset = row(ui, name, words(&now) != words(&was), |ui| {
-        ui.add_enabled_ui(all.len() > 1, |ui| choice(ui, name.name, &mut chosen, &all)).inner
+/// One of a list, the default first: also what is shown if it is none of them, as the file of another device may ask.
+fn pick<T: Copy + PartialEq>(
+    ui: &mut Ui,
+    viewer: &mut Viewer,
+    name: Name,
+    all: &[(T, &str, &str)],
+    [now, read]: [Option<T>; 2],
+    set: fn(&mut Settings, Option<T>),
+) {
+    let is_listed = |value: &T| all.iter().any(|(listed, ..)| listed == value);
+    let mut value = now.filter(is_listed).unwrap_or(all[0].0);
+    let mut changed = false;
+    let reset = row(ui, name, now != read, |ui| {
+        let response = ui.add_enabled_ui(all.len() > 1, |ui| choice(ui, name.name, &mut value, all)).inner;
+        changed = response.changed();
+        response
     });
-    if reset {
-        chosen = was;
+    if changed {
+        viewer.edit(ui, name.name, |s| set(s, Some(value)));
     }
-    if chosen != before {
-        viewer.search_by(chosen);
+    if reset {
+        viewer.reset(ui, |s| set(s, read));
     }
 }
 

@@ -63,8 +63,7 @@ impl Window {
         let first = First {
             choice: scene.map(|name| Choice { name: name.to_owned(), set }),
             limits: Limits { iterations: Some(ITERATIONS), ..Limits::default() },
-            output: None,
-            reference: None,
+            ..First::default()
         };
         let mut viewer = Viewer::new(engine(), Arc::new(|| {}), first);
         let asked = Arc::new(Mutex::new(vec![]));

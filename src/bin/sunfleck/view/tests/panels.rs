@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use clap::Parser;
 use eframe::egui;
 use egui::{Event, Key, Modifiers, PointerButton, Role, ViewportCommand};
 use egui_kittest::kittest::{NodeT, Queryable};
@@ -11,7 +12,8 @@ use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::Accelerator;
 use sunfleck::scene::shipped::NAMES;
 
-use super::Window;
+use super::{Window, engine};
+use crate::cli::{Cli, Command};
 use crate::view::app::{First, Viewer};
 use crate::view::engine::{Choice, Comparison, Phase, View};
 use crate::view::files::Purpose;
@@ -343,21 +345,41 @@ fn every_control_of_the_settings_does_something() {
 fn how_to_search_is_a_setting_that_can_be_undone() {
     let mut window = Window::with_picture();
     let estimate = window.viewer().now.estimate;
-    let accelerator = |window: &mut Window| window.viewer().wanted.search.accelerator;
+    let accel = |window: &mut Window| window.viewer().edits.now().accel;
     window.harness.get_by_role_and_label(Role::ComboBox, "Accelerator").click_accesskit();
     window.steps(3);
     window.click("Planes (kd)");
-    assert_eq!(accelerator(&mut window), Accelerator::Kd);
+    assert_eq!(accel(&mut window), Some(Accelerator::Kd));
     window.wait("another estimate", move |viewer| viewer.now.estimate > estimate);
     window.wait_for_picture();
-    assert!(window.viewer().command().unwrap().contains(" --accel kd"));
+    let frame = window.viewer().now.frame.clone().unwrap();
+    assert_eq!(frame.scene.accelerator(), Accelerator::Kd);
+    let command = window.viewer().command().unwrap();
+    assert!(command.contains(" --set accel=kd ") && command.matches("accel").count() == 1, "{command}");
+    assert!(window.viewer().settings_text().unwrap().contains("accel = \"kd\"\n"));
     window.press(Modifiers::COMMAND, Key::Z);
-    assert_eq!(accelerator(&mut window), Accelerator::Bvh);
+    assert_eq!(accel(&mut window), None);
     window.press(Modifiers::COMMAND, Key::Y);
+    assert_eq!(accel(&mut window), Some(Accelerator::Kd));
     window.activate("Reset accelerator");
-    assert_eq!(accelerator(&mut window), Accelerator::Bvh);
+    assert_eq!(accel(&mut window), None);
     // The processor has but one index.
     assert!(window.harness.get_by_role_and_label(Role::ComboBox, "Index").accesskit_node().is_disabled());
+}
+
+#[test]
+fn flags_that_say_how_to_search_hold_for_every_scene() {
+    let first = |line: &str| match Cli::parse_from(line.split(' ')).command {
+        Some(Command::View(args)) => First::resolve(&args).unwrap(),
+        other => panic!("{other:?}"),
+    };
+    let mut viewer = Viewer::new(engine(), Arc::new(|| {}), first("sunfleck view --accel kd"));
+    assert_eq!(viewer.wanted.scene, None);
+    viewer.open("glass");
+    assert_eq!(viewer.wanted.scene.unwrap().set, ["accel=kd"]);
+    // Over everything.
+    let choice = first("sunfleck view glass --accel kd --set accel=bvh").choice.unwrap();
+    assert_eq!(choice.set, ["accel=bvh", "accel=kd"]);
 }
 
 #[test]

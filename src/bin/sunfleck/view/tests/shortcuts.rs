@@ -99,7 +99,7 @@ const CASES: &[Case] = &[
         saved(window);
     }),
     case(COMMAND_SHIFT, Key::C, |_, window| {
-        let expected = "sunfleck render cornell --set photons=500 --set 'size=[32, 24]' --iterations 3 -o picture.exr";
+        let expected = "sunfleck render cornell --set photons=500 --set 'size=[32, 24]' --backend cpu --iterations 3 -o picture.exr";
         assert_eq!(window.copied, [expected]);
         window.wait_for_message("copied");
     }),

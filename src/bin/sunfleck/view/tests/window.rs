@@ -9,7 +9,7 @@ use egui::ViewportCommand::Close;
 use sunfleck::gpu::Context;
 
 use super::super::app::{First, Viewer};
-use super::super::engine::{Choice, Engine, Limits, Phase};
+use super::super::engine::{Choice, Engine, Phase};
 use super::super::window::{self, Bell, Drawn, FEWEST_FRAMES, Guest};
 use super::PATIENCE;
 use crate::devices::Device;
@@ -166,7 +166,7 @@ fn loses_its_device() {
     let engine = Engine::start(device, bell.wake()).unwrap();
     let set = ["size=32x24", "photons=500"].map(str::to_owned).to_vec();
     let choice = Some(Choice { name: "cornell".into(), set });
-    let first = First { choice, limits: Limits::default(), output: Some(rescued.clone()), reference: None };
+    let first = First { choice, output: Some(rescued.clone()), ..First::default() };
     let mut viewer = Viewer::new(engine, bell.wake(), first);
 
     // The renderer's: the window stays, with the picture, and it can be tried again.
