@@ -32,7 +32,9 @@ pub fn use_threads(threads: Option<u16>) -> Result<()> {
 /// Opens what the flags ask for, to search as the settings of `source` say.
 pub fn open_for(args: &DeviceArgs, source: &Source, progress: &Progress) -> Result<Device> {
     let mut device = open(args, progress)?;
-    device.cannot(source).iter().for_each(|warning| progress.say(&format!("sunfleck: warning: {warning}")));
+    for warning in device.cannot(source) {
+        progress.say(&format!("sunfleck: warning: {}", crate::one_line(&warning)));
+    }
     device.follow(&source.settings)?;
     Ok(device)
 }
