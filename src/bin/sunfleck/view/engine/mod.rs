@@ -23,7 +23,6 @@ use std::thread::JoinHandle;
 use anyhow::{Context, Result};
 use glam::Vec3;
 use sunfleck::output::Picture;
-use sunfleck::output::display::Look;
 use sunfleck::ppm::Interrupt;
 use sunfleck::scene::load::Loaded;
 use sunfleck::scene::settings::Settings;

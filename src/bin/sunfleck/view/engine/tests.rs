@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use sunfleck::cpu::CpuStages;
+use sunfleck::output::display::Look;
 use sunfleck::output::exr;
 use sunfleck::ppm::{self, Film, Stages};
 use sunfleck::scene::settings::{CameraSettings, Count};
