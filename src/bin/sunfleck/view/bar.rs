@@ -200,16 +200,13 @@ pub fn status(ui: &mut egui::Ui, viewer: &Viewer) {
             Phase::Loading => "Reading",
             Phase::Preparing => "Preparing",
             Phase::Starting => "First photons",
+            Phase::Rendering if viewer.wanted.paused => "Last iteration before the pause",
             Phase::Rendering => "Rendering",
             Phase::Paused => "Paused",
             Phase::Reached => "Limit reached",
             Phase::Failed(_) => "Failed",
         };
         ui.label(phase);
-        if let Phase::Failed(error) = &now.phase {
-            let text = egui::RichText::new(error).color(ui.visuals().error_fg_color);
-            ui.add(egui::Label::new(text).truncate());
-        }
         if let Some(frame) = &now.frame {
             let [width, height] = frame.params.size;
             let n = frame.film.n_iterations;

@@ -1,5 +1,6 @@
 //! The window of the system, and what may befall it.
 
+use std::panic::AssertUnwindSafe;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::{panic, thread};
@@ -8,7 +9,7 @@ use anyhow::{Result, anyhow};
 use eframe::{egui, wgpu};
 
 use super::app::Viewer;
-use super::engine::{Message, Wake, catch};
+use super::engine::{Message, Wake, panic_text};
 
 /// Where eframe keeps what is remembered, and what the window manager knows the window by.
 const APP_ID: &str = "sunfleck";
@@ -151,29 +152,42 @@ fn without_source(text: &str) -> &str {
     words.trim_end_matches('.')
 }
 
-/// A panic of the window's libraries is an error, told in one line: winit panics when the display goes away, egui-wgpu when
-/// the device is lost in the middle of a frame. There can be no other window after one.
+/// A panic of the window's libraries is an error, told in one line that names the library: winit panics when the display goes
+/// away, egui-wgpu when the device is lost in the middle of a frame. There can be no other window after one.
 fn quietly<T>(work: impl FnOnce() -> T) -> Result<T, String> {
-    if std::env::var_os("RUST_BACKTRACE").is_some_and(|value| value != "0") {
-        return catch(work);
-    }
+    let is_loud = std::env::var_os("RUST_BACKTRACE").is_some_and(|value| value != "0");
     let (here, usual) = (thread::current().id(), Arc::new(panic::take_hook()));
-    let elsewhere = Arc::clone(&usual);
+    let (elsewhere, whose) = (Arc::clone(&usual), Arc::new(Mutex::new(None)));
+    let place = Arc::clone(&whose);
     panic::set_hook(Box::new(move |info| {
-        if thread::current().id() != here {
+        let is_here = thread::current().id() == here;
+        if is_here {
+            *place.lock().unwrap_or_else(PoisonError::into_inner) = info.location().and_then(|l| library(l.file()));
+        }
+        if is_loud || !is_here {
             elsewhere(info);
         }
     }));
-    let done = catch(work);
+    let done = panic::catch_unwind(AssertUnwindSafe(work));
     panic::set_hook(Box::new(move |info| usual(info)));
-    done
+    done.map_err(|panic| {
+        let whose = whose.lock().unwrap_or_else(PoisonError::into_inner).take();
+        format!("{}: {}", whose.as_deref().unwrap_or("a bug in sunfleck"), panic_text(&*panic))
+    })
+}
+
+/// Name and version of the library that a source file of Cargo's registry is of; none for a file of this program.
+fn library(file: &str) -> Option<String> {
+    let path = file.replace('\\', "/");
+    let (_, rest) = path.split_once("/registry/src/")?;
+    rest.split('/').nth(1).map(str::to_owned)
 }
 
 /// Writes the newest film where the user wanted pictures, or wherever it can be written; where that is.
 fn rescue(viewer: &Viewer) -> Option<PathBuf> {
     let name = format!("sunfleck-{}.exr", std::process::id());
     let places = [viewer.output.clone(), Some(PathBuf::from(&name)), Some(std::env::temp_dir().join(&name))];
-    places.into_iter().flatten().find(|path| viewer.engine().save_at_once(&viewer.saving_to(path.clone())).is_ok())
+    places.into_iter().flatten().find(|path| viewer.engine().save_and_wait(&viewer.saving_to(path.clone())).is_ok())
 }
 
 struct Window<'a, G> {
@@ -203,5 +217,24 @@ impl<G: Guest> eframe::App for Window<'_, G> {
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
         self.viewer.save(storage);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_is_told_in_one_line_and_names_whose_it_is() {
+        assert_eq!(quietly(|| 3), Ok(3));
+        let text = quietly(|| -> u32 { panic!("at {}\nof", 7) }).unwrap_err();
+        assert_eq!(text, "a bug in sunfleck: at 7 of");
+        let text = quietly(|| egui::ColorImage::from_rgba_unmultiplied([2, 2], &[])).unwrap_err();
+        assert!(text.starts_with("epaint-"), "{text}");
+        assert_eq!(
+            library(r"C:\cargo\registry\src\index.crates.io-1\winit-0.30.13\src\lib.rs").as_deref(),
+            Some("winit-0.30.13")
+        );
+        assert_eq!(library("src/bin/sunfleck/view/app.rs"), None);
     }
 }

@@ -7,13 +7,15 @@
 mod history;
 mod paint;
 mod painting;
+mod saving;
 mod session;
 #[cfg(test)]
 mod tests;
 mod worker;
 
+use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -21,13 +23,13 @@ use std::thread::JoinHandle;
 use anyhow::{Context, Result};
 use glam::Vec3;
 use sunfleck::output::Picture;
-use sunfleck::output::display::Look;
 use sunfleck::ppm::Interrupt;
 use sunfleck::scene::load::Loaded;
 use sunfleck::scene::settings::Settings;
 
 pub use history::{History, Measured, Record, Series};
 pub use paint::{Comparison, Insides, Legend, Painted, Painting, Values, View};
+pub use saving::Save;
 pub use session::Frame;
 use worker::Work;
 
@@ -136,14 +138,6 @@ pub struct Reference {
     pub picture: Picture,
 }
 
-/// What to write, and where.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Save {
-    /// `.exr` or `.png`.
-    pub path: PathBuf,
-    pub look: Look,
-}
-
 /// Something that happened, for people.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Message {
@@ -156,7 +150,6 @@ pub enum Message {
 #[derive(Default)]
 struct Board {
     wanted: Wanted,
-    saves: Vec<Save>,
     reference: Option<Arc<Reference>>,
     /// Of a picture that the window can show, pixels.
     most_side: Option<usize>,
@@ -247,13 +240,15 @@ pub fn is_same<T>(a: Option<&Arc<T>>, b: Option<&Arc<T>>) -> bool {
     }
 }
 
-/// Does `work`; a panic in it becomes an error, one line.
+/// Does `work`; a panic in it becomes an error, one line. What it leaves half done is for the caller to throw away.
 pub fn catch<T>(work: impl FnOnce() -> T) -> Result<T, String> {
-    // What `work` may have left half done is thrown away by those who call this.
-    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
-        let text = panic.downcast_ref::<&str>().map(ToString::to_string).or(panic.downcast_ref::<String>().cloned());
-        crate::one_line(&format!("a bug in sunfleck: {}", text.unwrap_or_else(|| "panic".to_owned())))
-    })
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| format!("a bug in sunfleck: {}", panic_text(&*panic)))
+}
+
+/// What was panicked with, one line.
+pub fn panic_text(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().copied().or(panic.downcast_ref::<String>().map(String::as_str));
+    crate::one_line(text.unwrap_or("panic"))
 }
 
 /// What can be seen at a moment.
@@ -316,20 +311,29 @@ impl Engine {
         }
     }
 
-    /// Writes the picture as it is, without stopping; a message says how it went.
-    pub fn save(&self, save: Save) {
-        self.shared.board().saves.push(save);
-        self.shared.changed.notify_all();
+    /// Writes the newest film on a thread of its own: no iteration is waited for, none is held up. A message says how it
+    /// went.
+    pub fn save(&mut self, save: Save) {
+        let (newest, shared) = (self.newest(), Arc::clone(&self.shared));
+        self.threads.retain(|thread| !thread.is_finished());
+        self.threads.push(std::thread::spawn(move || {
+            let message = match newest.and_then(|newest| newest.write(&save)) {
+                Ok(n) => Message::Said(format!("saved {} after {n} iterations", save.path.display())),
+                Err(error) => Message::Error(crate::one_line(&crate::chain(&error))),
+            };
+            shared.update(|board| board.messages.push(message));
+        }));
     }
 
-    /// Writes the newest film that was read back, and comes back when that is done: for the end.
-    pub fn save_at_once(&self, save: &Save) -> Result<u32> {
-        let (frame, device) = {
-            let board = self.shared.board();
-            (board.frame.clone(), board.device.clone())
-        };
-        let frame = frame.context("there is no picture yet")?;
-        worker::write(save, &frame, device)
+    /// The same, and comes back when that is done: for the end.
+    pub fn save_and_wait(&self, save: &Save) -> Result<()> {
+        self.newest()?.write(save).map(|_| ())
+    }
+
+    fn newest(&self) -> Result<saving::Newest> {
+        let board = self.shared.board();
+        let frame = board.frame.clone().context("there is no picture yet")?;
+        Ok(saving::Newest { frame, device: board.device.clone() })
     }
 
     /// Larger pictures are shown reduced, pixels a side.

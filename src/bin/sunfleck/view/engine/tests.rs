@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use sunfleck::cpu::CpuStages;
+use sunfleck::output::display::Look;
 use sunfleck::output::exr;
 use sunfleck::ppm::{self, Film, Stages};
 use sunfleck::scene::settings::{CameraSettings, Count, Index};
@@ -20,6 +21,24 @@ struct Bench {
     engine: Engine,
     wanted: Wanted,
     wakes: Arc<AtomicUsize>,
+    gate: Arc<Gate>,
+}
+
+/// Holds the render thread up, where it has news.
+#[derive(Default)]
+struct Gate {
+    /// While somebody has it, the thread does not go on.
+    held: Mutex<()>,
+    is_reached: AtomicBool,
+}
+
+impl Gate {
+    fn pass(&self) {
+        if std::thread::current().name() == Some("render") && self.held.try_lock().is_err() {
+            self.is_reached.store(true, Ordering::Relaxed);
+            drop(self.held.lock());
+        }
+    }
 }
 
 impl Bench {
@@ -30,12 +49,14 @@ impl Bench {
 
     fn open_on(device: Device, name: &str, limits: Limits) -> Self {
         let wakes = Arc::new(AtomicUsize::new(0));
-        let count = Arc::clone(&wakes);
+        let gate = Arc::<Gate>::default();
+        let (count, barrier) = (Arc::clone(&wakes), Arc::clone(&gate));
         let wake: Wake = Arc::new(move || {
             count.fetch_add(1, Ordering::Relaxed);
+            barrier.pass();
         });
         let engine = Engine::start(device, wake).unwrap();
-        let mut bench = Self { engine, wanted: Wanted { limits, ..Wanted::default() }, wakes };
+        let mut bench = Self { engine, wanted: Wanted { limits, ..Wanted::default() }, wakes, gate };
         bench.choose(name, &["size=32x32", "photons=2000"]);
         bench
     }
@@ -80,7 +101,7 @@ impl Bench {
         self.wait(&format!("{phase:?} with {n} iterations"), |now| now.phase == *phase && iterations(now) == Some(n))
     }
 
-    fn save(&self, path: &Path) -> Message {
+    fn save(&mut self, path: &Path) -> Message {
         self.engine.take_messages();
         self.engine.save(Save { path: path.to_owned(), look: Look::default() });
         let mut said = vec![];
@@ -157,6 +178,21 @@ fn a_saved_picture_is_that_of_render_bit_for_bit() {
     assert_eq!(exr::read(&path).unwrap().rgb, film.rgb());
     let nowhere = folder.path().join("none/a.exr");
     assert!(matches!(bench.save(&nowhere), Message::Error(text) if text.contains("none")));
+}
+
+#[test]
+fn a_picture_is_saved_while_the_render_thread_is_busy() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    let mut bench = Bench::open("cornell", Limits::default());
+    bench.wait("a picture", |now| now.frame.is_some());
+    let gate = Arc::clone(&bench.gate);
+    let held = gate.held.lock().unwrap();
+    bench.wait("the gate", |_| gate.is_reached.load(Ordering::Relaxed));
+    let shown = bench.engine.now().frame.unwrap();
+    assert!(matches!(bench.save(&path), Message::Said(_)));
+    assert_eq!(exr::read(&path).unwrap().rgb, shown.film.rgb());
+    drop(held);
 }
 
 #[test]

@@ -1,16 +1,13 @@
 //! The render thread.
 
-use std::path::Path;
 use std::sync::Arc;
-use std::thread::JoinHandle;
 
-use anyhow::{Context, Result};
-use sunfleck::output;
+use anyhow::Result;
 use sunfleck::ppm::Error;
 use sunfleck::scene::settings::Settings;
 
-use super::session::{Frame, Session};
-use super::{Board, Choice, Message, Opened, Phase, Save, Shared, Wanted, catch, is_same};
+use super::session::Session;
+use super::{Board, Choice, Message, Opened, Phase, Shared, Wanted, catch, is_same};
 use crate::cli::InputArgs;
 use crate::devices::Device;
 use crate::job;
@@ -23,7 +20,6 @@ struct Have {
     opened: Option<Arc<Opened>>,
     estimate: u64,
     steps_done: u32,
-    writers: Vec<JoinHandle<()>>,
 }
 
 /// What stages under way are for.
@@ -43,13 +39,11 @@ impl Work {
 
 /// Until the interface is gone.
 pub fn run(shared: &Arc<Shared>, mut device: Device) {
-    let mut have =
-        Have { wanted: Wanted::default(), session: None, opened: None, estimate: 0, steps_done: 0, writers: vec![] };
+    let mut have = Have { wanted: Wanted::default(), session: None, opened: None, estimate: 0, steps_done: 0 };
     loop {
-        let (wanted, saves) = {
-            let mut board = shared.wait_until(|board| {
-                !board.saves.is_empty()
-                    || have.is_behind(&board.wanted)
+        let wanted = {
+            let board = shared.wait_until(|board| {
+                have.is_behind(&board.wanted)
                     || have.can_go_on(&board.wanted, board.noise())
                     || have.should_show(&board.wanted)
                     || have.should_say(board)
@@ -57,18 +51,13 @@ pub fn run(shared: &Arc<Shared>, mut device: Device) {
             if board.quit {
                 break;
             }
-            (board.wanted.clone(), std::mem::take(&mut board.saves))
+            board.wanted.clone()
         };
-        let done = catch(|| {
-            saves.into_iter().for_each(|save| have.save(shared, save));
-            have.follow(shared, &mut device, &wanted).map_err(|error| crate::one_line(&crate::chain(&error)))
-        });
+        let done =
+            catch(|| have.follow(shared, &mut device, &wanted).map_err(|error| crate::one_line(&crate::chain(&error))));
         if let Err(error) = done.flatten() {
             have.fail(shared, error);
         }
-    }
-    for writer in have.writers {
-        let _ = writer.join();
     }
 }
 
@@ -239,25 +228,6 @@ impl Have {
             board.phase = Phase::Failed(text);
         });
     }
-
-    /// On a thread of its own: files take their time.
-    fn save(&mut self, shared: &Arc<Shared>, save: Save) {
-        let newest = self.session.as_mut().filter(|session| session.n_iterations > 0).map(Session::frame);
-        let frame = match newest {
-            Some(Ok(frame)) => Some(Arc::new(frame)),
-            _ => shared.board().frame.clone(),
-        };
-        let (device, shared) = (shared.board().device.clone(), Arc::clone(shared));
-        self.writers.retain(|writer| !writer.is_finished());
-        self.writers.push(std::thread::spawn(move || {
-            let written = frame.context("there is no picture yet").and_then(|frame| write(&save, &frame, device));
-            let message = match written {
-                Ok(n) => Message::Said(format!("saved {} after {n} iterations", save.path.display())),
-                Err(error) => Message::Error(crate::one_line(&crate::chain(&error))),
-            };
-            shared.update(|board| board.messages.push(message));
-        }));
-    }
 }
 
 /// The phase of an estimate that does not go on.
@@ -311,32 +281,4 @@ fn of_scene(settings: &Settings) -> Settings {
         camera: None,
         ..settings.clone()
     }
-}
-
-pub fn write(save: &Save, frame: &Frame, adapter: String) -> Result<u32> {
-    let (film, params) = (&frame.film, &frame.params);
-    let picture = frame.picture();
-    if is_png(&save.path) {
-        output::png::write(&save.path, &picture, &save.look)?;
-    } else {
-        let header = output::exr::Header {
-            scene: frame.opened.source.name.clone(),
-            command: frame.opened.command(&frame.settings, frame.backend, film.n_iterations, &save.path),
-            adapter,
-            seed: params.seed,
-            alpha: params.alpha,
-            first_radius: frame.first_radius,
-            last_radius: frame.radius,
-            iterations: film.n_iterations,
-            photons_per_iteration: params.n_paths,
-            seconds: frame.seconds,
-            camera: frame.camera,
-        };
-        output::exr::write(&save.path, &picture, &header)?;
-    }
-    Ok(film.n_iterations)
-}
-
-fn is_png(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"))
 }
