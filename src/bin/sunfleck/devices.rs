@@ -176,11 +176,10 @@ impl Device {
     /// What the settings of `source` ask for and this device cannot do, a line each.
     pub fn cannot(&self, source: &Source) -> Vec<String> {
         let (settings, name) = (&source.settings, &source.name);
-        let device = self.gpu_name().unwrap_or_else(|| "the CPU".to_owned());
         let index = settings.index == Some(Index::Hardware) && !self.has_ray_queries();
         let accel = settings.accel == Some(Accelerator::Kd) && self.backend() != "cpu";
-        let index = index.then(|| format!("{name}: index: hardware needs ray queries, {device} has none: using tree"));
-        let accel = accel.then(|| format!("{name}: accel: kd is for the CPU, not for {device}: using bvh"));
+        let index = index.then(|| format!("{name}: index: hardware needs a GPU with ray queries; going by tree"));
+        let accel = accel.then(|| format!("{name}: accel: kd is for the CPU; a GPU goes by bvh"));
         index.into_iter().chain(accel).collect()
     }
 
