@@ -1,12 +1,15 @@
 //! Plots of how the estimate converges. egui_plot has no logarithmic axes: logarithms are plotted, their powers written.
 
+use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
 use eframe::egui;
-use egui_plot::{AxisHints, Corner, GridInput, GridMark, HoverPosition, Legend, Line, LineStyle, Plot, PlotPoints};
+use egui_plot::{AxisHints, GridInput, GridMark, HoverPosition, Line, LineStyle, Plot, PlotPoints};
+use sunfleck::inspect;
 use sunfleck::ppm::StageTimes;
 
 use super::app::Viewer;
+use super::charts::rgb;
 use super::engine::{History, Measured, Record};
 use crate::progress;
 
@@ -75,13 +78,21 @@ impl Kind {
 pub struct Convergence {
     by_seconds: bool,
     shown: [bool; KINDS.len()],
+    /// Names of lines that are not drawn.
+    pub hidden: BTreeSet<String>,
     made_of: Option<Key>,
     curves: [Vec<Curve>; KINDS.len()],
 }
 
 impl Default for Convergence {
     fn default() -> Self {
-        Self { by_seconds: false, shown: [true; KINDS.len()], made_of: None, curves: Default::default() }
+        Self {
+            by_seconds: false,
+            shown: [true; KINDS.len()],
+            hidden: BTreeSet::new(),
+            made_of: None,
+            curves: Default::default(),
+        }
     }
 }
 
@@ -140,7 +151,8 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
     }
     ui.columns(shown.len(), |columns| {
         for (ui, &i) in columns.iter_mut().zip(shown) {
-            plot(ui, KINDS[i], &view.curves[i], by_seconds);
+            title(ui, KINDS[i], &view.curves[i], &mut view.hidden);
+            plot(ui, KINDS[i], &view.curves[i], &view.hidden, by_seconds);
         }
     });
 }
@@ -168,14 +180,44 @@ fn heading(ui: &mut egui::Ui, view: &mut Convergence, (_, estimated, measured, _
     });
 }
 
-fn plot(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], by_seconds: bool) {
+/// What is plotted, and the names of its lines: over the plot, where they hide none of it.
+fn title(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &mut BTreeSet<String>) {
     let unit = match kind {
         Kind::Error => "Error, relMSE",
         Kind::Radius => "Radius",
         Kind::Rate => "Photons a second",
         Kind::Stages => "Stages, ms",
     };
-    ui.strong(unit).on_hover_text(kind.describe());
+    ui.horizontal_wrapped(|ui| {
+        ui.strong(unit).on_hover_text(kind.describe());
+        ui.spacing_mut().item_spacing.x = 3.0;
+        for (curve, color) in curves.iter().zip(colors(curves)).filter(|_| curves.len() > 1) {
+            let is_hidden = hidden.contains(&curve.name);
+            let (dash, color) =
+                (if curve.dashed { "- -" } else { "—" }, color.gamma_multiply(if is_hidden { 0.3 } else { 1.0 }));
+            let name = egui::RichText::new(&curve.name).small();
+            let name = if is_hidden { name.weak() } else { name };
+            let button =
+                ui.add(egui::Button::new((egui::RichText::new(dash).color(color).strong(), name)).frame(false));
+            if button.on_hover_text("Click to hide this line, or to show it again").clicked()
+                && !hidden.remove(&curve.name)
+            {
+                hidden.insert(curve.name.clone());
+            }
+        }
+    });
+}
+
+/// Of each line; a dashed one has that of the line before.
+fn colors(curves: &[Curve]) -> impl Iterator<Item = egui::Color32> {
+    let mut n_solid = 0;
+    curves.iter().map(move |curve| {
+        n_solid += u32::from(!curve.dashed);
+        rgb(inspect::bounce_color(1 + n_solid)) // The first is hard to see on white.
+    })
+}
+
+fn plot(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &BTreeSet<String>, by_seconds: bool) {
     let x_value = move |x: f64| match by_seconds {
         true => progress::seconds(10f64.powf(x)),
         false => format!("{:.0}", 10f64.powf(x)),
@@ -218,15 +260,10 @@ fn plot(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], by_seconds: bool) {
     } else {
         plot = plot.include_y(0.0);
     }
-    if curves.len() > 1 {
-        let corner = if kind == Kind::Stages { Corner::LeftTop } else { Corner::LeftBottom };
-        let legend = Legend::default().position(corner).text_style(egui::TextStyle::Small).background_alpha(0.6);
-        plot = plot.legend(legend.follow_insertion_order(true));
-    }
     plot.show(ui, |plot| {
-        for curve in curves {
+        for (curve, color) in curves.iter().zip(colors(curves)).filter(|(curve, _)| !hidden.contains(&curve.name)) {
             let style = if curve.dashed { LineStyle::dashed_loose() } else { LineStyle::Solid };
-            plot.line(Line::new(curve.name.clone(), PlotPoints::from(curve.points.clone())).style(style));
+            plot.line(Line::new(curve.name.clone(), PlotPoints::from(curve.points.clone())).color(color).style(style));
         }
     });
 }
