@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use eframe::egui;
+use egui::emath::GuiRounding;
 use egui::{Key, PointerButton, Rect, Vec2, pos2, vec2};
 use glam::Vec3;
 use sunfleck::inspect;
@@ -58,6 +59,11 @@ impl PictureView {
     /// The whole picture in the window.
     pub fn fit(&mut self) {
         (self.zoom, self.offset) = (None, Vec2::ZERO);
+    }
+
+    /// A pixel of it over so many of the screen.
+    pub fn magnify(&mut self, ctx: &egui::Context, pixels: f32) {
+        self.zoom = Some(pixels / ctx.pixels_per_point());
     }
 
     /// Something moves, at `time`, seconds: previews until it rests.
@@ -200,7 +206,9 @@ fn place(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, size: Vec2, response: &
     if response.dragged_by(PointerButton::Primary) && ui.input(|i| i.modifiers.command) && view.zoom.is_some() {
         view.offset += response.drag_delta();
     }
-    rect_at(view.zoom.unwrap_or(fitting), view.offset)
+    let rect = rect_at(view.zoom.unwrap_or(fitting), view.offset);
+    // From half a pixel of the screen on, rounding would double some of the picture's pixels and leave others out.
+    Rect::from_min_size(rect.min.round_to_pixels(ui.pixels_per_point()), rect.size())
 }
 
 /// Numbers in pixels large enough.
