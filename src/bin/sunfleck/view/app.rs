@@ -400,9 +400,8 @@ impl Viewer {
             self.title.clone_from(&title);
             ui.ctx().send_viewport_cmd(egui::ViewportCommand::Title(title));
         }
-        if let Some(dropped) = ui.input(|i| i.raw.dropped_files.first().map(|file| file.path().to_path_buf())) {
-            files::dropped(ui, self, &dropped);
-        }
+        let dropped: Vec<_> = ui.input(|i| i.raw.dropped_files.iter().map(|file| file.path().to_path_buf()).collect());
+        files::dropped(ui, self, &dropped);
     }
 
     fn show_messages(&mut self, ui: &egui::Ui) {

@@ -1,6 +1,7 @@
 //! Files: dialogs, dropped files, the clipboard.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 
 use eframe::egui;
@@ -17,21 +18,37 @@ pub enum Purpose {
     Reference,
 }
 
+/// What came of a dialog.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Answer {
+    File(PathBuf),
+    Cancelled,
+    /// The system has no dialogs: neither a desktop portal nor zenity.
+    NoDialog,
+}
+
 /// Asks for a file.
-pub type Pick = Arc<dyn Fn(Purpose, &str) -> Option<PathBuf> + Send + Sync>;
+pub type Pick = Arc<dyn Fn(Purpose, &str) -> Answer + Send + Sync>;
 
 /// A dialog under way, on a thread of its own.
 pub struct Dialog {
     purpose: Purpose,
-    answer: mpsc::Receiver<Option<PathBuf>>,
+    /// For a file that is saved, its extension left out.
+    name: String,
+    answer: mpsc::Receiver<Answer>,
 }
 
 const SCENES: &[&str] = &["glb", "gltf", "obj", "toml"];
 
 /// The system's dialog, for a file that is best called `name`; waits for the answer.
-pub fn pick(purpose: Purpose, name: &str) -> Option<PathBuf> {
+pub fn pick(purpose: Purpose, name: &str) -> Answer {
+    // Fails if there is a logger, which is then this one.
+    if log::set_logger(&DIALOG_FAULTS).is_ok() {
+        log::set_max_level(log::LevelFilter::Error);
+    }
+    DIALOG_FAULTS.0.store(false, Ordering::Relaxed);
     let dialog = rfd::FileDialog::new();
-    match purpose {
+    let path = match purpose {
         Purpose::Open => dialog.set_title("Open a scene").add_filter("Scenes and settings", SCENES).pick_file(),
         Purpose::SavePicture => dialog
             .set_title("Save the picture")
@@ -44,7 +61,32 @@ pub fn pick(purpose: Purpose, name: &str) -> Option<PathBuf> {
             .add_filter("Settings", &["toml"])
             .save_file(),
         Purpose::Reference => dialog.set_title("Open a reference").add_filter("OpenEXR", &["exr"]).pick_file(),
+    };
+    match path {
+        Some(path) => Answer::File(path),
+        None if DIALOG_FAULTS.0.load(Ordering::Relaxed) => Answer::NoDialog,
+        None => Answer::Cancelled,
     }
+}
+
+/// Notes that there was no dialog: rfd gives no file then, as if it was cancelled, and only logs why. zenity is the last that
+/// it tries.
+struct DialogFaults(AtomicBool);
+
+static DIALOG_FAULTS: DialogFaults = DialogFaults(AtomicBool::new(false));
+
+impl log::Log for DialogFaults {
+    fn enabled(&self, metadata: &log::Metadata<'_>) -> bool {
+        metadata.level() == log::Level::Error && metadata.target().starts_with("rfd::")
+    }
+
+    fn log(&self, record: &log::Record<'_>) {
+        if self.enabled(record.metadata()) && record.args().to_string().contains("zenity") {
+            self.0.store(true, Ordering::Relaxed);
+        }
+    }
+
+    fn flush(&self) {}
 }
 
 fn ask(viewer: &mut Viewer, purpose: Purpose) {
@@ -59,12 +101,12 @@ fn ask(viewer: &mut Viewer, purpose: Purpose) {
         .map(|choice| Path::new(&choice.name).file_stem().unwrap_or_default().to_string_lossy().into_owned());
     let name = stem.unwrap_or_else(|| "picture".to_owned());
     let (wake, pick) = (viewer.wake(), Arc::clone(&viewer.pick));
+    let named = name.clone();
     std::thread::spawn(move || {
-        let path = pick(purpose, &name);
-        let _ = sender.send(path);
+        let _ = sender.send(pick(purpose, &named));
         wake();
     });
-    viewer.dialog = Some(Dialog { purpose, answer });
+    viewer.dialog = Some(Dialog { purpose, name, answer });
 }
 
 /// Takes the answer of a dialog, if there is one.
@@ -73,11 +115,20 @@ pub fn poll(ui: &egui::Ui, viewer: &mut Viewer) {
     let answer = match dialog.answer.try_recv() {
         Ok(answer) => answer,
         Err(mpsc::TryRecvError::Empty) => return,
-        Err(mpsc::TryRecvError::Disconnected) => None,
+        Err(mpsc::TryRecvError::Disconnected) => Answer::Cancelled,
     };
-    let purpose = dialog.purpose;
-    viewer.dialog = None;
-    let Some(path) = answer else { return };
+    let Some(Dialog { purpose, name, .. }) = viewer.dialog.take() else { return };
+    let path = match answer {
+        Answer::File(path) => path,
+        Answer::Cancelled => return,
+        Answer::NoDialog => match without_dialog(purpose, &name) {
+            Ok((path, why)) => {
+                viewer.say(ui, Message::Warning(why));
+                path
+            }
+            Err(why) => return viewer.say(ui, Message::Error(why)),
+        },
+    };
     match purpose {
         Purpose::Open => viewer.open(path.to_string_lossy()),
         Purpose::SavePicture => {
@@ -87,6 +138,20 @@ pub fn poll(ui: &egui::Ui, viewer: &mut Viewer) {
         Purpose::SaveSettings => save_settings(ui, viewer, &path),
         Purpose::Reference => super::compare::load(ui, viewer, &path),
     }
+}
+
+/// Where a file goes that cannot be asked for, and what is told of it; what else can be done, if it is to be read.
+fn without_dialog(purpose: Purpose, name: &str) -> Result<(PathBuf, String), String> {
+    let no_dialog = "no file dialog: neither a desktop portal nor zenity answers";
+    let extension = match purpose {
+        Purpose::Open => return Err(format!("{no_dialog}; drop a scene on the window, or: sunfleck view SCENE")),
+        Purpose::Reference => return Err(format!("{no_dialog}; drop an .exr on the window, or use --reference")),
+        Purpose::SavePicture => "exr",
+        Purpose::SaveSettings => "toml",
+    };
+    let path = free_name(name, extension);
+    let why = format!("{no_dialog}; written into the working folder, as {}", path.display());
+    Ok((path, why))
 }
 
 pub fn open(viewer: &mut Viewer) {
@@ -117,15 +182,23 @@ pub fn ask_reference(viewer: &mut Viewer) {
     ask(viewer, Purpose::Reference);
 }
 
-/// A scene, settings, or a reference picture.
-pub fn dropped(ui: &egui::Ui, viewer: &mut Viewer, path: &Path) {
-    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    match extension.as_deref() {
-        Some("exr") => super::compare::load(ui, viewer, path),
-        Some(e) if SCENES.contains(&e) => viewer.open(path.to_string_lossy()),
-        _ => {
-            let text = format!("{}: neither a scene (.glb, .gltf, .obj, .toml) nor a reference (.exr)", path.display());
+/// Scenes, settings, reference pictures: the first of each kind, the others are named.
+pub fn dropped(ui: &egui::Ui, viewer: &mut Viewer, paths: &[PathBuf]) {
+    let (mut has_scene, mut has_reference) = (false, false);
+    for path in paths {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        let is_reference = extension.as_deref() == Some("exr");
+        let name = path.display();
+        if !is_reference && !extension.is_some_and(|e| SCENES.contains(&e.as_str())) {
+            let text = format!("{name}: neither a scene (.glb, .gltf, .obj, .toml) nor a reference (.exr)");
             viewer.say(ui, Message::Error(text));
+        } else if std::mem::replace(if is_reference { &mut has_reference } else { &mut has_scene }, true) {
+            let what = if is_reference { "reference" } else { "scene" };
+            viewer.say(ui, Message::Warning(format!("{name} is left out: one {what} at a time")));
+        } else if is_reference {
+            super::compare::load(ui, viewer, path);
+        } else {
+            viewer.open(path.to_string_lossy());
         }
     }
 }
@@ -167,4 +240,38 @@ pub fn screenshot(ui: &egui::Ui, viewer: &Viewer) {
 fn free_name(stem: &str, extension: &str) -> PathBuf {
     let name = |i: u32| PathBuf::from(format!("{stem}-{i}.{extension}"));
     (1..).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_a_dialog_pictures_are_written_beside_those_that_are_there() {
+        for (purpose, extension) in [(Purpose::SavePicture, "exr"), (Purpose::SaveSettings, "toml")] {
+            let (path, why) = without_dialog(purpose, "no such name").unwrap();
+            assert_eq!(path, PathBuf::from(format!("no such name-1.{extension}")));
+            assert!(why.contains("zenity") && why.contains("no such name-1"), "{why}");
+        }
+        for purpose in [Purpose::Open, Purpose::Reference] {
+            assert!(without_dialog(purpose, "x").unwrap_err().contains("drop"));
+        }
+    }
+
+    #[test]
+    fn only_the_last_resort_of_dialogs_is_a_fault() {
+        let faults = DialogFaults(AtomicBool::new(false));
+        for (target, text, is_fault) in [
+            ("wgpu::zenity", "Failed to pick file with zenity: x", false),
+            ("rfd::backend", "OpenFile failed: no portal", false),
+            ("rfd::backend", "Failed to pick file with zenity: x", true),
+        ] {
+            let record = |arguments: std::fmt::Arguments<'_>| {
+                let record = log::Record::builder().level(log::Level::Error).target(target).args(arguments).build();
+                log::Log::log(&faults, &record);
+            };
+            record(format_args!("{text}"));
+            assert_eq!(faults.0.load(Ordering::Relaxed), is_fault, "{target}: {text}");
+        }
+    }
 }

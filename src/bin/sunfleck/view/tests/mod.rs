@@ -1,5 +1,6 @@
 //! The window, driven without a display; the engine behind it is the real one, on the processor.
 
+mod files;
 mod panels;
 mod shortcuts;
 mod snapshots;
@@ -16,7 +17,7 @@ use tempfile::TempDir;
 
 use super::app::{First, Viewer};
 use super::engine::{Choice, Engine, Limits, Phase};
-use super::files::Purpose;
+use super::files::{Answer, Purpose};
 use crate::devices::Device;
 
 /// For anything that is waited for.
@@ -70,7 +71,7 @@ impl Window {
         let (noted, place) = (Arc::clone(&asked), folder.path().to_owned());
         viewer.pick = Arc::new(move |purpose, _| {
             noted.lock().unwrap().push(purpose);
-            Some(place.join(file_of(purpose)))
+            Answer::File(place.join(file_of(purpose)))
         });
         let harness = Harness::builder()
             .with_size([1280.0, 720.0])
@@ -167,7 +168,14 @@ impl Window {
 
     /// Drops a file on the window.
     fn drop_file(&mut self, path: PathBuf) {
-        self.harness.input_mut().dropped_files.push(Arc::new(Dropped(path)));
+        self.drop_files([path]);
+    }
+
+    /// All at once.
+    fn drop_files(&mut self, paths: impl IntoIterator<Item = PathBuf>) {
+        for path in paths {
+            self.harness.input_mut().dropped_files.push(Arc::new(Dropped(path)));
+        }
         self.steps(2);
     }
 }

@@ -1,0 +1,49 @@
+//! Files that come from outside, dialogs that are not there, and the picture on the screen.
+
+use std::sync::Arc;
+
+use eframe::egui;
+use egui::{Key, Modifiers};
+
+use super::Window;
+use crate::view::files::Answer;
+
+#[test]
+fn files_dropped_at_once_are_each_taken_or_named() {
+    let mut window = Window::with_picture();
+    let [picture, scene, second] = ["picture.exr", "scene.toml", "second.toml"].map(|name| window.path(name));
+    window.viewer().save_to(picture.clone());
+    window.wait_for_message("saved ");
+    std::fs::write(&scene, "scene = \"cornell\"\nsize = [16, 12]\nphotons = 200\n").unwrap();
+    window.drop_files(["readme.txt".into(), picture, scene, second]);
+    assert!(window.shows("readme.txt: neither a scene") && window.shows("second.toml is left out"));
+    window.wait("both", |viewer| {
+        viewer.now.reference.is_some() && viewer.now.painted.as_ref().is_some_and(|painted| painted.size == [16, 12])
+    });
+}
+
+#[test]
+fn without_dialogs_it_is_said_what_else_there_is() {
+    let mut window = Window::new(None);
+    window.viewer().pick = Arc::new(|_, _| Answer::NoDialog);
+    window.press(Modifiers::COMMAND, Key::O);
+    window.wait_for_message("no file dialog");
+    assert!(window.viewer().dialog.is_none());
+}
+
+#[test]
+fn a_pixel_of_the_picture_is_a_pixel_of_the_screen() {
+    let mut window = Window::with_picture();
+    window.viewer().remembered.show_inspect = false;
+    for (scale, size) in
+        [(1.0, [1280.0, 720.0]), (1.0, [1281.0, 721.0]), (1.5, [1279.0, 720.0]), (2.0, [1281.5, 721.0])]
+    {
+        window.harness.set_pixels_per_point(scale);
+        window.harness.set_size(size.into());
+        window.press(Modifiers::NONE, Key::Num2);
+        window.steps(2);
+        let rect = window.viewer().picture.rect.unwrap() * scale;
+        assert!((rect.size() - egui::vec2(32.0, 24.0)).abs().max_elem() < 1e-3, "{scale}: {rect}");
+        assert!((rect.min - rect.min.round()).abs().max_elem() < 1e-3, "{scale}: {rect}");
+    }
+}
