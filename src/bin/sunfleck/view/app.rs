@@ -337,7 +337,7 @@ impl Viewer {
                 panel.show(ui, |ui| super::settings::show(ui, self));
             }
             if self.remembered.show_inspect {
-                let panel = egui::Panel::right("inspect").resizable(true).default_size(250.0).size_range(180.0..=500.0);
+                let panel = egui::Panel::right("inspect").resizable(true).default_size(264.0).size_range(180.0..=500.0);
                 panel.show(ui, |ui| super::inspect::show(ui, self));
             }
         }
