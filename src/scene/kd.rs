@@ -4,8 +4,11 @@ use obvhs::aabb::Aabb;
 
 use super::bvh;
 use super::packed::primitive_box;
-use crate::index::kd::{Error, FaceTree, KdOptions, KdTree, Triangles};
+use crate::index::kd::{Error, FaceTree, KdOptions, KdTree, Sah, Triangles};
 use crate::layout::{PRIMITIVE_SPHERE, Primitive, SceneNode};
+
+/// κ_T for κ_I = 1: what a step down the tree costs beside a test of a triangle, measured (docs/performance.md).
+const TRAVERSAL: f64 = 4.0;
 
 /// What finds the primitives along a ray, on the CPU. The picture is the same with either.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -49,8 +52,9 @@ impl SceneKd {
         };
         let vertices: Vec<[f32; 3]> = triangles.iter().flat_map(corners).collect();
         let faces = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        let tree =
-            KdTree::new(Triangles::new(vertices, faces)?, &KdOptions { parallel: true, ..KdOptions::default() })?;
+        let sah = Sah { traversal: TRAVERSAL, ..Sah::default() };
+        let options = KdOptions { parallel: true, sah, ..KdOptions::default() };
+        let tree = KdTree::new(Triangles::new(vertices, faces)?, &options)?;
         let boxes: Vec<Aabb> = spheres.iter().map(|&i| primitive_box(&primitives[i as usize])).collect();
         let (sphere_nodes, order) = bvh::build(&boxes);
         let spheres = order.iter().map(|&i| spheres[i as usize]).collect();

@@ -56,7 +56,7 @@ pub struct PhotonsArgs {
     photons: Vec<u32>,
 
     /// Size of the picture [default: the paper's 1920x1080]
-    #[arg(short, long, value_name = "WxH", value_parser = crate::cli::size)]
+    #[arg(short, long, value_name = "WxH", value_parser = crate::cli::values::size)]
     resolution: Option<[u32; 2]>,
 
     /// Iterations that count, after one that does not [default: the paper's 50]

@@ -9,7 +9,7 @@ use sunfleck::points::Method;
 use sunfleck::points::generate::{SHAPES, Shape};
 use sunfleck::scene::settings::parse_count;
 
-use super::number;
+use super::values::number;
 
 /// Of a made cloud's noise and shift, its shapes being 2 across; also degrees it is turned by.
 const MAX_LENGTH: f64 = 1e6;

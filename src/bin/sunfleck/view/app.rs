@@ -12,6 +12,7 @@ use sunfleck::scene::settings::Settings;
 
 use super::engine::{Choice, Engine, Limits, Message, Now, Opened, Phase, Save, Wake, Wanted, is_same};
 use super::files;
+use super::messages::Messages;
 use super::picture::PictureView;
 use super::state::{Edits, Remembered};
 use crate::cli::{Usage, ViewArgs};
@@ -19,8 +20,6 @@ use crate::scenes::Source;
 
 /// Key of what is remembered.
 const REMEMBERED: &str = "remembered";
-/// Seconds that a message stays.
-const MESSAGE_SECONDS: f64 = 6.0;
 
 /// What the command line asks for.
 #[derive(Clone, Debug, Default)]
@@ -84,8 +83,7 @@ pub struct Viewer {
     most_side: usize,
     /// Of the window.
     title: String,
-    /// With the times they appeared.
-    messages: Vec<(f64, Message)>,
+    pub messages: Messages,
     pub show_help: bool,
     pub dialog: Option<files::Dialog>,
     /// To be read.
@@ -118,7 +116,7 @@ impl Viewer {
             always: first.always,
             most_side: 0,
             title: String::new(),
-            messages: vec![],
+            messages: Messages::default(),
             show_help: false,
             dialog: None,
             reference: first.reference,
@@ -141,7 +139,7 @@ impl Viewer {
         self.picture.forget();
         self.compare.forget();
         (self.start, self.timing, self.title) = (Default::default(), Default::default(), String::new());
-        self.messages.iter_mut().for_each(|(when, _)| *when = 0.0);
+        self.messages.repeat();
     }
 
     /// Keeps what is to be remembered.
@@ -285,20 +283,12 @@ impl Viewer {
 
     /// Shows a message.
     pub fn say(&mut self, ui: &egui::Ui, message: Message) {
-        self.messages.push((ui.input(|i| i.time), message));
-    }
-
-    /// What is being told.
-    #[cfg(test)]
-    pub fn messages(&self) -> impl Iterator<Item = &str> {
-        self.messages.iter().map(|(_, message)| match message {
-            Message::Said(text) | Message::Warning(text) | Message::Error(text) => text.as_str(),
-        })
+        self.messages.say(ui.input(|i| i.time), message);
     }
 
     /// The same in the next window.
     pub fn tell(&mut self, message: Message) {
-        self.messages.push((0.0, message));
+        self.messages.say(0.0, message);
     }
 
     /// Asks for another frame, from any thread.
@@ -337,7 +327,7 @@ impl Viewer {
                 panel.show(ui, |ui| super::settings::show(ui, self));
             }
             if self.remembered.show_inspect {
-                let panel = egui::Panel::right("inspect").resizable(true).default_size(250.0).size_range(180.0..=500.0);
+                let panel = egui::Panel::right("inspect").resizable(true).default_size(264.0).size_range(180.0..=500.0);
                 panel.show(ui, |ui| super::inspect::show(ui, self));
             }
         }
@@ -349,7 +339,7 @@ impl Viewer {
             super::start::drop_hint(ui);
         }
         super::help::show(ui, self);
-        self.show_messages(ui);
+        self.messages.show(ui);
         let asks = |w: &Wanted| (w.settings.clone(), w.scene.clone(), w.restarts);
         if asks(&wanted) != asks(&self.wanted) {
             self.timing.ask(began, self.now.estimate);
@@ -373,7 +363,7 @@ impl Viewer {
             self.engine.set_most_side(most_side);
         }
         let time = ui.input(|i| i.time);
-        self.messages.extend(self.engine.take_messages().into_iter().map(|message| (time, message)));
+        self.engine.take_messages().into_iter().for_each(|message| self.messages.say(time, message));
         if !is_same(self.editing.as_ref(), self.now.opened.as_ref()) {
             self.selected = None;
             let is_reload = self.wanted.settings.is_some() && self.now.opened.is_some();
@@ -402,43 +392,5 @@ impl Viewer {
         }
         let dropped: Vec<_> = ui.input(|i| i.raw.dropped_files.iter().map(|file| file.path().to_path_buf()).collect());
         files::dropped(ui, self, &dropped);
-    }
-
-    fn show_messages(&mut self, ui: &egui::Ui) {
-        let now = ui.input(|i| i.time);
-        self.messages.retain(|(when, message)| matches!(message, Message::Error(_)) || now - when < MESSAGE_SECONDS);
-        if self.messages.is_empty() {
-            return;
-        }
-        let mut dismissed = None;
-        egui::Area::new(egui::Id::unique("messages")).anchor(egui::Align2::RIGHT_BOTTOM, [-12.0, -36.0]).show(
-            ui.ctx(),
-            |ui| {
-                for (i, (_, message)) in self.messages.iter().enumerate() {
-                    let (text, color) = match message {
-                        Message::Said(text) => (text, ui.visuals().text_color()),
-                        Message::Warning(text) => (text, ui.visuals().warn_fg_color),
-                        Message::Error(text) => (text, ui.visuals().error_fg_color),
-                    };
-                    egui::Frame::popup(ui.style()).show(ui, |ui| {
-                        ui.set_max_width(420.0);
-                        ui.horizontal_wrapped(|ui| {
-                            ui.colored_label(color, text);
-                            if ui.small_button("Dismiss").clicked() {
-                                dismissed = Some(i);
-                            }
-                        });
-                    });
-                }
-            },
-        );
-        if let Some(i) = dismissed {
-            self.messages.remove(i);
-        }
-        // Errors stay; nobody need look after them.
-        let passing = self.messages.iter().filter(|(_, message)| !matches!(message, Message::Error(_)));
-        if let Some(end) = passing.map(|(when, _)| when + MESSAGE_SECONDS).reduce(f64::min) {
-            ui.ctx().request_repaint_after_secs((end - now).max(0.0) as f32);
-        }
     }
 }

@@ -16,6 +16,7 @@ mod help;
 mod inspect;
 mod keys;
 pub mod measure;
+mod messages;
 mod offscreen;
 mod picture;
 mod settings;

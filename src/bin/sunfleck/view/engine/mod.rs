@@ -332,7 +332,9 @@ impl Engine {
 
     fn newest(&self) -> Result<saving::Newest> {
         let board = self.shared.board();
-        let frame = board.frame.clone().context("there is no picture yet")?;
+        // The film of a scene that has been left stays until the render thread comes to its end.
+        let frame = board.frame.clone().filter(|frame| Some(&frame.opened.choice) == board.wanted.scene.as_ref());
+        let frame = frame.context("there is no picture yet")?;
         Ok(saving::Newest { frame, device: board.device.clone() })
     }
 

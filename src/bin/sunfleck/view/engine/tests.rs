@@ -192,6 +192,8 @@ fn a_picture_is_saved_while_the_render_thread_is_busy() {
     let shown = bench.engine.now().frame.unwrap();
     assert!(matches!(bench.save(&path), Message::Said(_)));
     assert_eq!(exr::read(&path).unwrap().rgb, shown.film.rgb());
+    bench.choose("glass", &["size=8x8", "photons=10"]);
+    assert_eq!(bench.save(&path), Message::Error("there is no picture yet".to_owned()));
     drop(held);
 }
 
