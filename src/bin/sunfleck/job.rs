@@ -215,16 +215,21 @@ fn camera(scene: &Scene, wanted: Option<&str>) -> Result<Camera> {
 /// Refuses a picture that could not be written later.
 #[cfg(feature = "view")]
 pub fn check_output(path: &Path) -> Result<()> {
-    check_format(path)?;
+    check_format(path).map_err(of_flag)?;
     Ok(atomic::check(path)?)
 }
 
-fn check_format(path: &Path) -> Result<()> {
+/// Refuses a name that says no format.
+pub fn check_format(path: &Path) -> Result<(), String> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    if !matches!(extension.as_deref(), Some("exr" | "png")) {
-        bail!(Usage(format!("-o {}: a picture ends in .exr or .png", path.display())));
+    match extension.as_deref() {
+        Some("exr" | "png") => Ok(()),
+        _ => Err(format!("{}: a picture ends in .exr or .png", path.display())),
     }
-    Ok(())
+}
+
+fn of_flag(why: String) -> Usage {
+    Usage(format!("-o {why}"))
 }
 
 /// Refuses what could not be written later, or would overwrite what is read.
@@ -233,7 +238,7 @@ fn check_outputs(args: &RenderArgs) -> Result<()> {
         bail!(Usage("nowhere to put the picture: add -o out.png or -o out.exr".into()));
     }
     for path in &args.output {
-        check_format(path)?;
+        check_format(path).map_err(of_flag)?;
     }
     let files: Vec<_> = args.output.iter().chain(&args.json).collect();
     for (i, path) in files.iter().enumerate() {

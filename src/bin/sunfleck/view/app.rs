@@ -20,6 +20,8 @@ use crate::scenes::Source;
 
 /// Key of what is remembered.
 const REMEMBERED: &str = "remembered";
+/// Width of a window with panels on either side of the picture, points.
+const LEAST_FOR_BOTH: f32 = 720.0;
 
 /// What the command line asks for.
 #[derive(Clone, Debug, Default)]
@@ -326,7 +328,9 @@ impl Viewer {
                 let panel = egui::Panel::left("settings").resizable(true).default_size(270.0).size_range(200.0..=500.0);
                 panel.show(ui, |ui| super::settings::show(ui, self));
             }
-            if self.remembered.show_inspect {
+            // In a narrow window it gives way, so that the picture does not.
+            let has_room = !self.remembered.show_settings || ui.content_rect().width() >= LEAST_FOR_BOTH;
+            if self.remembered.show_inspect && has_room {
                 let panel = egui::Panel::right("inspect").resizable(true).default_size(264.0).size_range(180.0..=500.0);
                 panel.show(ui, |ui| super::inspect::show(ui, self));
             }

@@ -63,7 +63,8 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
         ui.menu_button("Window", |ui| {
             let remembered = &mut viewer.remembered;
             ui.checkbox(&mut remembered.show_settings, "Settings").on_hover_text("F1");
-            ui.checkbox(&mut remembered.show_inspect, "Inspect").on_hover_text("F2");
+            ui.checkbox(&mut remembered.show_inspect, "Inspect")
+                .on_hover_text("F2; where there is room beside the settings");
             ui.checkbox(&mut remembered.show_convergence, "Convergence").on_hover_text("F3");
             ui.separator();
             let theme = ui.ctx().options(|options| options.theme_preference);

@@ -131,10 +131,13 @@ pub fn poll(ui: &egui::Ui, viewer: &mut Viewer) {
     };
     match purpose {
         Purpose::Open => viewer.open(path.to_string_lossy()),
-        Purpose::SavePicture => {
-            viewer.output = Some(path.clone());
-            viewer.save_to(path);
-        }
+        Purpose::SavePicture => match crate::job::check_format(&path) {
+            Ok(()) => {
+                viewer.output = Some(path.clone());
+                viewer.save_to(path);
+            }
+            Err(why) => viewer.say(ui, Message::Error(why)),
+        },
         Purpose::SaveSettings => save_settings(ui, viewer, &path),
         Purpose::Reference => super::compare::load(ui, viewer, &path),
     }

@@ -32,6 +32,28 @@ fn without_dialogs_it_is_said_what_else_there_is() {
 }
 
 #[test]
+fn a_picture_is_saved_under_no_other_name() {
+    let mut window = Window::with_picture();
+    let wrong = window.path("picture.jpg");
+    let asked = wrong.clone();
+    window.viewer().pick = Arc::new(move |_, _| Answer::File(asked.clone()));
+    window.press(Modifiers::COMMAND, Key::S);
+    window.wait_for_message("picture.jpg: a picture ends in .exr or .png");
+    assert!(window.viewer().output.is_none() && !wrong.exists());
+}
+
+#[test]
+fn a_narrow_window_keeps_the_picture() {
+    let mut window = Window::with_picture();
+    for (width, both) in [(1280.0, true), (480.0, false), (800.0, true)] {
+        window.harness.set_size([width, 320.0].into());
+        window.steps(3);
+        assert_eq!((window.shows("Estimator"), window.shows("Under the cursor")), (true, both), "{width}");
+        assert!(window.viewer().picture.area.is_some_and(|area| area.width() >= 160.0), "{width}");
+    }
+}
+
+#[test]
 fn a_pixel_of_the_picture_is_a_pixel_of_the_screen() {
     let mut window = Window::with_picture();
     window.viewer().remembered.show_inspect = false;
