@@ -6,6 +6,7 @@
 //! | `chromaticities` | | sRGB's (ITU-R BT.709, D65) |
 //! | `software`, `sunfleckVersion` | string | `Sunfleck 0.1.0 (commit)`; version and commit alone |
 //! | `adapter`, `scene`, `command` | string | device, SCENE as given, the whole command line |
+//! | `index`, `accelerator` | string | what found photons (`tree`, `hardware`), and surfaces (`bvh`, `kd`) |
 //! | `seed`, `iterations`, `photonsPerIteration` | int | double where above 2³¹ − 1; photon *paths* |
 //! | `samplesPerPixel` | int | `iterations`, under the name that other tools read |
 //! | `alpha`, `firstRadius`, `lastRadius` | float | metres; the median where each pixel has its own |
@@ -40,6 +41,10 @@ pub struct Header {
     pub command: String,
     /// Device that computed it.
     pub adapter: String,
+    /// What found photons: `tree` or `hardware`.
+    pub index: String,
+    /// What found the surface that a ray meets: `bvh` or `kd`.
+    pub accelerator: String,
     /// Of the random numbers.
     pub seed: u32,
     /// Of the radius schedule.
@@ -102,6 +107,8 @@ fn layer_attributes(picture: &Picture, header: &Header) -> LayerAttributes {
         ("scene", AttributeValue::Text(text(&header.scene))),
         ("command", AttributeValue::Text(text(&header.command))),
         ("adapter", AttributeValue::Text(text(&header.adapter))),
+        ("index", AttributeValue::Text(text(&header.index))),
+        ("accelerator", AttributeValue::Text(text(&header.accelerator))),
         ("seed", count(header.seed)),
         ("iterations", count(header.iterations)),
         ("samplesPerPixel", count(header.iterations)),
@@ -241,6 +248,8 @@ mod tests {
         let header = Header {
             scene: "söne".into(),
             adapter: "llvmpipe".into(),
+            index: "tree".into(),
+            accelerator: "bvh".into(),
             seed: u32::MAX,
             alpha: 0.5,
             first_radius: 0.25,
@@ -260,7 +269,9 @@ mod tests {
         assert_eq!(get("photonsPerIteration"), AttributeValue::I32(500_000));
         assert_eq!(get("alpha"), AttributeValue::F32(0.5));
         assert_eq!(get("lastRadius"), AttributeValue::F32(0.125));
-        assert_eq!(get("sunfleckVersion"), AttributeValue::Text(Text::from(VERSION)));
+        for (name, value) in [("sunfleckVersion", VERSION), ("index", "tree"), ("accelerator", "bvh")] {
+            assert_eq!(get(name), AttributeValue::Text(Text::from(value)));
+        }
         let m = Mat4::from_cols_array(&own.world_to_camera.unwrap());
         assert_eq!(m.transform_point3(Vec3::new(5.0, 1.0, 0.0)), Vec3::ZERO);
         assert_eq!(m.transform_point3(Vec3::new(3.0, 1.0, 0.0)), Vec3::new(0.0, 0.0, -2.0));

@@ -241,7 +241,7 @@ fn a_picture_saved_in_the_window_is_what_its_command_renders() {
     let path = Path::new(PROGRAM).parent().unwrap().display().to_string();
     let path = format!("{path}:{}", std::env::var("PATH").unwrap_or_default());
     let mut shell = Command::new("sh");
-    shell.arg("-c").arg(format!("{command} --backend gpu --quiet")).env("PATH", path).current_dir(opened.folder.path());
+    shell.arg("-c").arg(format!("{command} --quiet")).env("PATH", path).current_dir(opened.folder.path());
     let rendered = shell.output().unwrap();
     assert!(rendered.status.success(), "{command}: {}", String::from_utf8_lossy(&rendered.stderr));
     let [kept, rendered] = [&kept, &saved].map(|path| output::exr::read(path).unwrap());

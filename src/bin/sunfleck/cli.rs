@@ -12,10 +12,11 @@ use clap::{Args, Parser, Subcommand};
 use sunfleck::output::VERSION;
 use sunfleck::output::tonemap::ToneMap;
 use sunfleck::ppm::{Direct, FirstRadius, Kernel};
-use sunfleck::scene::settings::parse_count;
+use sunfleck::scene::Accelerator;
+use sunfleck::scene::settings::{Index, parse_count};
 #[cfg(feature = "view")]
 use values::noise;
-use values::{Crop, alpha, crop, direct, exposure, kernel, positive_f64, radius, size, tonemap};
+use values::{Crop, accelerator, alpha, crop, direct, exposure, index, kernel, positive_f64, radius, size, tonemap};
 
 /// Exit code of a command line that makes no sense.
 pub const USAGE: u8 = 2;
@@ -164,12 +165,12 @@ pub struct DeviceArgs {
     pub device: Option<String>,
 
     /// How the GPU finds photons; hardware: by ray queries, where the adapter has them (see --list-devices) [default: tree]
-    #[arg(long, value_parser = ["tree", "hardware"], help_heading = "Device")]
-    pub index: Option<String>,
+    #[arg(long, value_parser = index(), help_heading = "Device")]
+    pub index: Option<Index>,
 
     /// How the CPU finds what a ray meets: boxes or planes, the same picture; kd chooses the CPU [default: bvh]
-    #[arg(long, value_parser = ["bvh", "kd"], help_heading = "Device")]
-    pub accel: Option<String>,
+    #[arg(long, value_parser = accelerator(), help_heading = "Device")]
+    pub accel: Option<Accelerator>,
 
     /// CPU threads [default: all]
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Device")]

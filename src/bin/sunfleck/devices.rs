@@ -41,8 +41,8 @@ pub fn open_for(args: &DeviceArgs, source: &Source, progress: &Progress) -> Resu
 
 /// Opens what the flags ask for.
 pub fn open(args: &DeviceArgs, progress: &Progress) -> Result<Device> {
-    let is_hardware = args.index.as_deref() == Some("hardware");
-    let accelerator = if args.accel.as_deref() == Some("kd") { Accelerator::Kd } else { Accelerator::Bvh };
+    let is_hardware = args.index == Some(Index::Hardware);
+    let accelerator = args.accel.unwrap_or_default();
     let cpu = match accelerator {
         Accelerator::Kd if args.backend == "gpu" => {
             bail!(Usage("--accel kd needs --backend cpu, a GPU goes by its BVH".into()))
@@ -178,7 +178,8 @@ impl Device {
         let (settings, name) = (&source.settings, &source.name);
         let index = settings.index == Some(Index::Hardware) && !self.has_ray_queries();
         let accel = settings.accel == Some(Accelerator::Kd) && self.backend() != "cpu";
-        let index = index.then(|| format!("{name}: index: hardware needs a GPU with ray queries; going by tree"));
+        let index = index
+            .then(|| format!("{name}: index: hardware needs ray queries, which this device has not; going by tree"));
         let accel = accel.then(|| format!("{name}: accel: kd is for the CPU; a GPU goes by bvh"));
         index.into_iter().chain(accel).collect()
     }
@@ -192,7 +193,7 @@ impl Device {
                 let is_hardware = settings.index == Some(Index::Hardware) && context.info().ray_queries;
                 let wanted = if is_hardware { Method::Hardware } else { Method::Tree };
                 if *method != wanted {
-                    *self = reopened(context, wanted)?;
+                    *self = reopened(context, wanted).context("index")?;
                 }
             }
         }
@@ -225,7 +226,7 @@ impl Device {
             Some(before) => PackedScene::new_after(before, scene),
             None => PackedScene::new(scene),
         };
-        Ok(Arc::new(packed.accelerated(self.accelerator()).context("no kd-tree over this scene")?))
+        Ok(Arc::new(packed.accelerated(self.accelerator()).context("accel: no kd-tree over this scene")?))
     }
 
     /// Takes the scene to the device.

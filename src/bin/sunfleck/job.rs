@@ -228,6 +228,11 @@ pub fn check_format(path: &Path) -> Result<(), String> {
     }
 }
 
+/// Whether a picture of this name is a PNG, not an EXR.
+pub fn is_png(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"))
+}
+
 fn of_flag(why: String) -> Usage {
     Usage(format!("-o {why}"))
 }

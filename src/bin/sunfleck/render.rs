@@ -10,7 +10,7 @@ use sunfleck::ppm::{self, Error, Film, FirstRadius, Params, RadiusSchedule, Stag
 
 use crate::cli::RenderArgs;
 use crate::devices;
-use crate::job::{Input, Job};
+use crate::job::{Input, Job, is_png};
 use crate::progress::{self, Progress, Status};
 use crate::report::{Device, End, Iteration, Radius, Report, Seconds, Settings};
 use crate::stop::Stop;
@@ -225,6 +225,8 @@ impl<'a> Run<'a> {
             scene: self.job.scene_name.clone(),
             command: command_line(),
             adapter: self.report.device.name.clone(),
+            index: self.report.device.index.clone(),
+            accelerator: self.report.device.accelerator.clone(),
             seed: params.seed,
             alpha: params.alpha,
             first_radius: self.radii.median,
@@ -236,8 +238,7 @@ impl<'a> Run<'a> {
         };
         let mut first_error = None;
         for path in &self.job.outputs {
-            let is_png = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
-            let written = if is_png {
+            let written = if is_png(path) {
                 output::png::write(path, &picture, &self.job.look)
             } else {
                 output::exr::write(path, &picture, &header)

@@ -52,6 +52,15 @@ pub enum Index {
     Hardware,
 }
 
+impl fmt::Display for Index {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Self::Tree => "tree",
+            Self::Hardware => "hardware",
+        })
+    }
+}
+
 /// The kinds of lights without extent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]

@@ -3,7 +3,8 @@
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use sunfleck::output::tonemap::ToneMap;
 use sunfleck::ppm::{Direct, FirstRadius, Kernel};
-use sunfleck::scene::settings::MAX_SIDE;
+use sunfleck::scene::Accelerator;
+use sunfleck::scene::settings::{Index, MAX_SIDE};
 
 /// The part of the picture to compute.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -104,6 +105,15 @@ pub fn kernel() -> impl TypedValueParser<Value = Kernel> {
 pub fn direct() -> impl TypedValueParser<Value = Direct> {
     PossibleValuesParser::new(["sampled", "photons"])
         .map(|name| if name == "photons" { Direct::Photons } else { Direct::Sampled })
+}
+
+pub fn index() -> impl TypedValueParser<Value = Index> {
+    PossibleValuesParser::new(["tree", "hardware"])
+        .map(|name| if name == "hardware" { Index::Hardware } else { Index::Tree })
+}
+
+pub fn accelerator() -> impl TypedValueParser<Value = Accelerator> {
+    PossibleValuesParser::new(["bvh", "kd"]).map(|name| if name == "kd" { Accelerator::Kd } else { Accelerator::Bvh })
 }
 
 #[cfg(test)]

@@ -22,6 +22,8 @@ use crate::scenes::Source;
 const REMEMBERED: &str = "remembered";
 /// Width of a window with panels on either side of the picture, points.
 const LEAST_FOR_BOTH: f32 = 720.0;
+/// Width of the picture between them, points.
+const LEAST_PICTURE: f32 = 160.0;
 
 /// What the command line asks for.
 #[derive(Clone, Debug, Default)]
@@ -29,6 +31,8 @@ pub struct First {
     pub choice: Option<Choice>,
     /// `key=value`, over the settings of every scene.
     pub always: Vec<String>,
+    /// The GPU that was asked for.
+    pub device: Option<String>,
     pub limits: Limits,
     /// Where saving goes without asking.
     pub output: Option<PathBuf>,
@@ -54,7 +58,8 @@ impl First {
             Source::resolve(&choice.name)?.set(&choice.set)?;
         }
         let limits = Limits { iterations: args.iterations, seconds: args.seconds, noise: args.noise };
-        Ok(Self { choice, always, limits, output: args.output.clone(), reference: args.reference.clone() })
+        let (device, output, reference) = (args.device.device.clone(), args.output.clone(), args.reference.clone());
+        Ok(Self { choice, always, device, limits, output, reference })
     }
 }
 
@@ -74,13 +79,18 @@ pub struct Viewer {
     pub compare: super::compare::CompareView,
     /// Index into the scene's materials.
     pub selected: Option<usize>,
+    /// Where saving goes without asking, and where the picture of which scene was saved last.
     pub output: Option<PathBuf>,
+    pub saved_as: Option<(Option<Arc<Choice>>, PathBuf)>,
+    device_flags: String,
     pub convergence: super::convergence::Convergence,
     pub timing: super::timing::Timing,
     /// What was open before.
     pub previous: Option<Arc<Choice>>,
     /// Of [`First`].
     always: Vec<String>,
+    /// Of the last frame, seconds, by the window's clock.
+    pub time: f64,
     /// Of a texture, pixels.
     most_side: usize,
     /// Of the window.
@@ -100,6 +110,8 @@ pub struct Viewer {
 impl Viewer {
     pub fn new(engine: Engine, wake: Wake, first: First) -> Self {
         let now = engine.now();
+        let device = first.device.map(|device| format!(" --device {}", crate::render::quote(&device)));
+        let device_flags = format!("--backend {}{}", engine.backend(), device.unwrap_or_default());
         let wanted = Wanted { scene: first.choice.map(Arc::new), limits: first.limits, ..Wanted::default() };
         Self {
             engine,
@@ -112,10 +124,13 @@ impl Viewer {
             inspect: Default::default(),
             compare: Default::default(),
             output: first.output,
+            saved_as: None,
+            device_flags,
             convergence: Default::default(),
             timing: Default::default(),
             previous: None,
             always: first.always,
+            time: 0.0,
             most_side: 0,
             title: String::new(),
             messages: Messages::default(),
@@ -227,6 +242,17 @@ impl Viewer {
         self.wanted.painting.look.exposure = Some((2.0 * (now.unwrap_or(0.0) + stops)).round() / 2.0);
     }
 
+    /// In a narrow window it gives way to the settings, so that the picture does not.
+    fn shows_inspect(&self, width: f32) -> bool {
+        self.remembered.show_inspect && (!self.remembered.show_settings || width >= LEAST_FOR_BOTH)
+    }
+
+    /// In a window of this width, points. Where there is room for one panel, it takes that of the settings.
+    pub fn toggle_inspect(&mut self, width: f32) {
+        self.remembered.show_inspect = !self.shows_inspect(width);
+        self.remembered.show_settings &= !self.remembered.show_inspect || width >= LEAST_FOR_BOTH;
+    }
+
     pub fn next_tone(&mut self) {
         let tonemap = &mut self.wanted.painting.look.tonemap;
         *tonemap = match tonemap {
@@ -260,7 +286,7 @@ impl Viewer {
     pub fn command(&self) -> Option<String> {
         let opened = self.editing.as_ref()?;
         let iterations = self.now.frame.as_ref().map_or(1, |frame| frame.film.n_iterations);
-        Some(opened.command(self.edits.now(), self.engine.backend(), iterations, Path::new("picture.exr")))
+        Some(opened.command(self.edits.now(), &self.device_flags, iterations, Path::new("picture.exr")))
     }
 
     /// What is open.
@@ -280,7 +306,14 @@ impl Viewer {
 
     /// The picture as it looks now, to be written to `path`.
     pub fn saving_to(&self, path: PathBuf) -> Save {
-        Save { path, look: self.wanted.painting.look }
+        let (look, scene) = (self.wanted.painting.look, self.wanted.scene.clone());
+        Save { path, look, scene, device_flags: self.device_flags.clone() }
+    }
+
+    /// Where saving goes without asking.
+    pub fn place(&self) -> Option<&PathBuf> {
+        let saved_as = self.saved_as.as_ref().filter(|(scene, _)| *scene == self.wanted.scene);
+        saved_as.map(|(_, path)| path).or(self.output.as_ref())
     }
 
     /// Shows a message.
@@ -319,19 +352,20 @@ impl Viewer {
         egui::Panel::top("bar").show(ui, |ui| super::bar::show(ui, self));
         egui::Panel::bottom("status").show(ui, |ui| super::bar::status(ui, self));
         if self.editing.is_some() {
+            let width = ui.content_rect().width();
+            // Of a panel, so that the picture keeps some room between two.
+            let most = (0.5 * (width - LEAST_PICTURE)).clamp(200.0, 500.0);
             if self.remembered.show_convergence {
                 let panel =
                     egui::Panel::bottom("convergence").resizable(true).default_size(220.0).size_range(120.0..=600.0);
                 panel.show(ui, |ui| super::convergence::show(ui, self));
             }
             if self.remembered.show_settings {
-                let panel = egui::Panel::left("settings").resizable(true).default_size(270.0).size_range(200.0..=500.0);
+                let panel = egui::Panel::left("settings").resizable(true).default_size(270.0).size_range(200.0..=most);
                 panel.show(ui, |ui| super::settings::show(ui, self));
             }
-            // In a narrow window it gives way, so that the picture does not.
-            let has_room = !self.remembered.show_settings || ui.content_rect().width() >= LEAST_FOR_BOTH;
-            if self.remembered.show_inspect && has_room {
-                let panel = egui::Panel::right("inspect").resizable(true).default_size(264.0).size_range(180.0..=500.0);
+            if self.shows_inspect(width) {
+                let panel = egui::Panel::right("inspect").resizable(true).default_size(264.0).size_range(180.0..=most);
                 panel.show(ui, |ui| super::inspect::show(ui, self));
             }
         }
@@ -367,6 +401,7 @@ impl Viewer {
             self.engine.set_most_side(most_side);
         }
         let time = ui.input(|i| i.time);
+        self.time = time;
         self.engine.take_messages().into_iter().for_each(|message| self.messages.say(time, message));
         if !is_same(self.editing.as_ref(), self.now.opened.as_ref()) {
             self.selected = None;

@@ -18,8 +18,8 @@ const MOST_POINTS: usize = 500;
 /// Width below which fewer plots stand side by side, points.
 const LEAST_WIDTH: f32 = 210.0;
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Kind {
     Error,
     Radius,
     Rate,
@@ -78,8 +78,8 @@ impl Kind {
 pub struct Convergence {
     by_seconds: bool,
     shown: [bool; KINDS.len()],
-    /// Names of lines that are not drawn.
-    pub hidden: BTreeSet<String>,
+    /// Lines that are not drawn: of which plot, the how manieth.
+    pub hidden: Hidden,
     made_of: Option<Key>,
     curves: [Vec<Curve>; KINDS.len()],
 }
@@ -89,12 +89,14 @@ impl Default for Convergence {
         Self {
             by_seconds: false,
             shown: [true; KINDS.len()],
-            hidden: BTreeSet::new(),
+            hidden: Hidden::new(),
             made_of: None,
             curves: Default::default(),
         }
     }
 }
+
+type Hidden = BTreeSet<(Kind, usize)>;
 
 /// What lines depend on.
 type Key = (Option<Record>, Option<Measured>, Option<Measured>, bool);
@@ -181,7 +183,7 @@ fn heading(ui: &mut egui::Ui, view: &mut Convergence, (_, estimated, measured, _
 }
 
 /// What is plotted, and the names of its lines: over the plot, where they hide none of it.
-fn title(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &mut BTreeSet<String>) {
+fn title(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &mut Hidden) {
     let unit = match kind {
         Kind::Error => "Error, relMSE",
         Kind::Radius => "Radius",
@@ -191,18 +193,17 @@ fn title(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &mut BTreeSet<
     ui.horizontal_wrapped(|ui| {
         ui.strong(unit).on_hover_text(kind.describe());
         ui.spacing_mut().item_spacing.x = 3.0;
-        for (curve, color) in curves.iter().zip(colors(curves)).filter(|_| curves.len() > 1) {
-            let is_hidden = hidden.contains(&curve.name);
-            let (dash, color) =
-                (if curve.dashed { "- -" } else { "—" }, color.gamma_multiply(if is_hidden { 0.3 } else { 1.0 }));
-            let name = egui::RichText::new(&curve.name).small();
-            let name = if is_hidden { name.weak() } else { name };
-            let button =
-                ui.add(egui::Button::new((egui::RichText::new(dash).color(color).strong(), name)).frame(false));
-            if button.on_hover_text("Click to hide this line, or to show it again").clicked()
-                && !hidden.remove(&curve.name)
-            {
-                hidden.insert(curve.name.clone());
+        for (i, (curve, color)) in curves.iter().zip(colors(curves)).enumerate().filter(|_| curves.len() > 1) {
+            let line = (kind, i);
+            let is_shown = !hidden.contains(&line);
+            let (color, name) =
+                (color.gamma_multiply(if is_shown { 1.0 } else { 0.3 }), egui::RichText::new(&curve.name));
+            let name = if is_shown { name.small() } else { name.small().weak() };
+            let dash = egui::RichText::new(if curve.dashed { "- -" } else { "—" }).color(color).strong();
+            let button = ui.add(egui::Button::new((dash, name)).frame(false));
+            button.widget_info(|| egui::WidgetInfo::selected(egui::Role::CheckBox, true, is_shown, &curve.name));
+            if button.on_hover_text("Click to hide this line, or to show it again").clicked() && !hidden.remove(&line) {
+                hidden.insert(line);
             }
         }
     });
@@ -217,7 +218,7 @@ fn colors(curves: &[Curve]) -> impl Iterator<Item = egui::Color32> {
     })
 }
 
-fn plot(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &BTreeSet<String>, by_seconds: bool) {
+fn plot(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &Hidden, by_seconds: bool) {
     let x_value = move |x: f64| match by_seconds {
         true => progress::seconds(10f64.powf(x)),
         false => format!("{:.0}", 10f64.powf(x)),
@@ -261,9 +262,12 @@ fn plot(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &BTreeSet<Strin
         plot = plot.include_y(0.0);
     }
     plot.show(ui, |plot| {
-        for (curve, color) in curves.iter().zip(colors(curves)).filter(|(curve, _)| !hidden.contains(&curve.name)) {
-            let style = if curve.dashed { LineStyle::dashed_loose() } else { LineStyle::Solid };
-            plot.line(Line::new(curve.name.clone(), PlotPoints::from(curve.points.clone())).color(color).style(style));
+        for (i, (curve, color)) in curves.iter().zip(colors(curves)).enumerate() {
+            if !hidden.contains(&(kind, i)) {
+                let style = if curve.dashed { LineStyle::dashed_loose() } else { LineStyle::Solid };
+                let line = Line::new(curve.name.clone(), PlotPoints::from(curve.points.clone()));
+                plot.line(line.id(egui::Id::unique((kind, i))).color(color).style(style));
+            }
         }
     });
 }

@@ -7,7 +7,7 @@ use std::sync::{Arc, mpsc};
 use eframe::egui;
 
 use super::app::Viewer;
-use super::engine::Message;
+use super::engine::{Choice, Message};
 
 /// What a dialog was for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +35,8 @@ pub struct Dialog {
     purpose: Purpose,
     /// For a file that is saved, its extension left out.
     name: String,
+    /// The scene that it was asked for.
+    scene: Option<Arc<Choice>>,
     answer: mpsc::Receiver<Answer>,
 }
 
@@ -91,7 +93,9 @@ impl log::Log for DialogFaults {
 
 fn ask(viewer: &mut Viewer, purpose: Purpose) {
     if viewer.dialog.is_some() {
-        return;
+        // Some systems never answer.
+        let text = "a file dialog is open already; sunfleck view SCENE -o FILE saves without one".to_owned();
+        return viewer.messages.say(viewer.time, Message::Warning(text));
     }
     let (sender, answer) = mpsc::channel();
     let stem = viewer
@@ -106,7 +110,7 @@ fn ask(viewer: &mut Viewer, purpose: Purpose) {
         let _ = sender.send(pick(purpose, &named));
         wake();
     });
-    viewer.dialog = Some(Dialog { purpose, name, answer });
+    viewer.dialog = Some(Dialog { purpose, name, scene: viewer.wanted.scene.clone(), answer });
 }
 
 /// Takes the answer of a dialog, if there is one.
@@ -117,7 +121,7 @@ pub fn poll(ui: &egui::Ui, viewer: &mut Viewer) {
         Err(mpsc::TryRecvError::Empty) => return,
         Err(mpsc::TryRecvError::Disconnected) => Answer::Cancelled,
     };
-    let Some(Dialog { purpose, name, .. }) = viewer.dialog.take() else { return };
+    let Some(Dialog { purpose, name, scene, .. }) = viewer.dialog.take() else { return };
     let path = match answer {
         Answer::File(path) => path,
         Answer::Cancelled => return,
@@ -129,11 +133,16 @@ pub fn poll(ui: &egui::Ui, viewer: &mut Viewer) {
             Err(why) => return viewer.say(ui, Message::Error(why)),
         },
     };
+    let is_of_scene = matches!(purpose, Purpose::SavePicture | Purpose::SaveSettings);
+    if is_of_scene && scene != viewer.wanted.scene {
+        let text = format!("{} was not written: the scene it was for has been left", path.display());
+        return viewer.say(ui, Message::Error(text));
+    }
     match purpose {
         Purpose::Open => viewer.open(path.to_string_lossy()),
         Purpose::SavePicture => match crate::job::check_format(&path) {
             Ok(()) => {
-                viewer.output = Some(path.clone());
+                viewer.saved_as = Some((scene, path.clone()));
                 viewer.save_to(path);
             }
             Err(why) => viewer.say(ui, Message::Error(why)),
@@ -152,8 +161,8 @@ fn without_dialog(purpose: Purpose, name: &str) -> Result<(PathBuf, String), Str
         Purpose::SavePicture => "exr",
         Purpose::SaveSettings => "toml",
     };
-    let path = free_name(name, extension);
-    let why = format!("{no_dialog}; written into the working folder, as {}", path.display());
+    let path = free_name(Path::new(""), name, extension);
+    let why = format!("{no_dialog}; {} goes to the working folder", path.display());
     Ok((path, why))
 }
 
@@ -163,7 +172,7 @@ pub fn open(viewer: &mut Viewer) {
 
 /// Where it went last, else asks.
 pub fn save(viewer: &mut Viewer) {
-    match viewer.output.clone() {
+    match viewer.place().cloned() {
         Some(path) => viewer.save_to(path),
         None => save_as(viewer),
     }
@@ -187,22 +196,27 @@ pub fn ask_reference(viewer: &mut Viewer) {
 
 /// Scenes, settings, reference pictures: the first of each kind, the others are named.
 pub fn dropped(ui: &egui::Ui, viewer: &mut Viewer, paths: &[PathBuf]) {
-    let (mut has_scene, mut has_reference) = (false, false);
-    for path in paths {
-        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-        let is_reference = extension.as_deref() == Some("exr");
-        let name = path.display();
-        if !is_reference && !extension.is_some_and(|e| SCENES.contains(&e.as_str())) {
-            let text = format!("{name}: neither a scene (.glb, .gltf, .obj, .toml) nor a reference (.exr)");
-            viewer.say(ui, Message::Error(text));
-        } else if std::mem::replace(if is_reference { &mut has_reference } else { &mut has_scene }, true) {
-            let what = if is_reference { "reference" } else { "scene" };
-            viewer.say(ui, Message::Warning(format!("{name} is left out: one {what} at a time")));
-        } else if is_reference {
-            super::compare::load(ui, viewer, path);
-        } else {
-            viewer.open(path.to_string_lossy());
+    let extension = |path: &Path| path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let is_reference = |path: &&PathBuf| extension(path).as_deref() == Some("exr");
+    let is_scene = |path: &&PathBuf| extension(path).is_some_and(|e| SCENES.contains(&e.as_str()));
+    let names = |paths: &[&PathBuf]| paths.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ");
+    let (references, rest): (Vec<_>, Vec<_>) = paths.iter().partition(is_reference);
+    let (scenes, unknown): (Vec<_>, Vec<_>) = rest.into_iter().partition(is_scene);
+    if let Some(path) = references.first() {
+        super::compare::load(ui, viewer, path);
+    }
+    if let Some(path) = scenes.first() {
+        viewer.open(path.to_string_lossy());
+    }
+    for (what, all) in [("reference", &references), ("scene", &scenes)] {
+        if all.len() > 1 {
+            viewer.say(ui, Message::Warning(format!("{}: left out, one {what} at a time", names(&all[1..]))));
         }
+    }
+    if !unknown.is_empty() {
+        let name = names(&unknown);
+        let text = format!("{name}: neither a scene (.glb, .gltf, .obj, .toml) nor a reference (.exr)");
+        viewer.say(ui, Message::Error(text));
     }
 }
 
@@ -228,7 +242,7 @@ pub fn copy_command(ui: &egui::Ui, viewer: &mut Viewer) {
 pub fn screenshot(ui: &egui::Ui, viewer: &Viewer) {
     let say = viewer.engine().speaker();
     let write = move |image: std::sync::Arc<egui::ColorImage>| {
-        let path = free_name("sunfleck-window", "png");
+        let path = free_name(Path::new(""), "sunfleck-window", "png");
         let [width, height] = image.size.map(|n| n as u32);
         let written = image::save_buffer(&path, image.as_raw(), width, height, image::ColorType::Rgba8);
         say(match written {
@@ -239,9 +253,9 @@ pub fn screenshot(ui: &egui::Ui, viewer: &Viewer) {
     ui.ctx().send_viewport_cmd(egui::ViewportCommand::Screenshot(egui::ScreenshotCallback::new(write)));
 }
 
-/// In the working folder, not there yet.
-fn free_name(stem: &str, extension: &str) -> PathBuf {
-    let name = |i: u32| PathBuf::from(format!("{stem}-{i}.{extension}"));
+/// In `folder`, not there yet.
+fn free_name(folder: &Path, stem: &str, extension: &str) -> PathBuf {
+    let name = |i: u32| folder.join(format!("{stem}-{i}.{extension}"));
     (1..).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0))
 }
 
@@ -255,6 +269,12 @@ mod tests {
             let (path, why) = without_dialog(purpose, "no such name").unwrap();
             assert_eq!(path, PathBuf::from(format!("no such name-1.{extension}")));
             assert!(why.contains("zenity") && why.contains("no such name-1"), "{why}");
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let names = ["x-1.exr", "x-2.exr", "x-3.exr"].map(|name| folder.path().join(name));
+        for name in &names {
+            assert_eq!(free_name(folder.path(), "x", "exr"), *name);
+            std::fs::write(name, "").unwrap();
         }
         for purpose in [Purpose::Open, Purpose::Reference] {
             assert!(without_dialog(purpose, "x").unwrap_err().contains("drop"));

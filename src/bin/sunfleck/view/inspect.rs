@@ -130,13 +130,12 @@ fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
         ui.end_row();
         ui.label("Zoom");
         ui.horizontal(|ui| {
-            let pixel = 1.0 / ui.pixels_per_point();
             let zoom = &mut viewer.picture.zoom;
             for (value, name, text) in [
                 (None, "Fit", "The whole picture in the window (1)"),
-                (Some(pixel), "1:1", "One pixel to a pixel of the screen (2)"),
+                (Some(1.0), "1:1", "One pixel to a pixel of the screen (2)"),
                 (
-                    Some(4.0 * pixel),
+                    Some(4.0),
                     "4:1",
                     "Four pixels of the screen to a pixel (3); Ctrl + wheel for more, until values appear",
                 ),

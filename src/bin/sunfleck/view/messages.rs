@@ -1,4 +1,4 @@
-//! What the window tells, in its corner: errors until they are dismissed, the rest for a while.
+//! What the window tells, in its corner: errors until they are dismissed or there are too many, the rest for a while.
 
 use eframe::egui;
 
@@ -6,7 +6,7 @@ use super::engine::Message;
 
 /// Messages that are no errors go away by themselves.
 const SECONDS: f64 = 6.0;
-/// At a time; the oldest give way.
+/// At a time; the oldest give way, those that are no errors before those that are.
 const MOST: usize = 6;
 
 /// With the times they were said, the newest last.
@@ -19,7 +19,8 @@ impl Messages {
         self.0.retain(|(_, said)| *said != message);
         self.0.push((time, message));
         if self.0.len() > MOST {
-            self.0.remove(0);
+            let first = self.0.iter().position(|(_, message)| !is_error(message)).unwrap_or(0);
+            self.0.remove(first);
         }
     }
 
@@ -90,5 +91,7 @@ mod tests {
         messages.say(20.0, Message::Error("7".to_owned()));
         assert_eq!(messages.texts().last(), Some("7"));
         assert_eq!(messages.texts().count(), MOST);
+        messages.say(21.0, Message::Said("saved".to_owned()));
+        assert_eq!(messages.texts().collect::<Vec<_>>(), ["6", "0", "1", "2", "3", "7"]);
     }
 }

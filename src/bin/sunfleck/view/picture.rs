@@ -31,7 +31,7 @@ const MOST_ZOOM: f32 = 128.0;
 pub struct PictureView {
     texture: Option<egui::TextureHandle>,
     painted: Option<Arc<Painted>>,
-    /// Points a pixel; fitting the window if none.
+    /// Pixels of the screen a pixel; fitting the window if none.
     pub zoom: Option<f32>,
     /// From the window's middle to the picture's, points.
     offset: Vec2,
@@ -59,11 +59,6 @@ impl PictureView {
     /// The whole picture in the window.
     pub fn fit(&mut self) {
         (self.zoom, self.offset) = (None, Vec2::ZERO);
-    }
-
-    /// A pixel of it over so many of the screen.
-    pub fn magnify(&mut self, ctx: &egui::Context, pixels: f32) {
-        self.zoom = Some(pixels / ctx.pixels_per_point());
     }
 
     /// Something moves, at `time`, seconds: previews until it rests.
@@ -186,8 +181,9 @@ fn waiting(ui: &egui::Ui, viewer: &Viewer, area: Rect) {
 /// Zooms and shifts; where the picture is.
 fn place(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, size: Vec2, response: &egui::Response) -> Rect {
     let view = &mut viewer.picture;
-    let fitting = (area.size() / size).min_elem();
-    let rect_at = |zoom: f32, offset: Vec2| Rect::from_center_size(area.center() + offset, size * zoom);
+    let scale = ui.pixels_per_point();
+    let fitting = scale * (area.size() / size).min_elem();
+    let rect_at = |zoom: f32, offset: Vec2| Rect::from_center_size(area.center() + offset, size * zoom / scale);
     // Ctrl and the wheel, or two fingers.
     let factor = if response.hovered() { ui.input(egui::InputState::zoom_delta) } else { 1.0 };
     if factor != 1.0
@@ -198,7 +194,7 @@ fn place(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, size: Vec2, response: &
         // What is under the cursor stays there.
         let from_cursor = rect_at(before, view.offset).center() - cursor;
         view.offset = cursor + from_cursor * (after / before) - area.center();
-        view.zoom = (after > fitting).then_some(after);
+        view.zoom = (after != fitting).then_some(after);
     }
     if view.zoom.is_none() {
         view.offset = Vec2::ZERO;
@@ -208,7 +204,7 @@ fn place(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, size: Vec2, response: &
     }
     let rect = rect_at(view.zoom.unwrap_or(fitting), view.offset);
     // From half a pixel of the screen on, rounding would double some of the picture's pixels and leave others out.
-    Rect::from_min_size(rect.min.round_to_pixels(ui.pixels_per_point()), rect.size())
+    Rect::from_min_size(rect.min.round_to_pixels(scale), rect.size())
 }
 
 /// Numbers in pixels large enough.

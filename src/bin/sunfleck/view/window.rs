@@ -186,7 +186,7 @@ fn library(file: &str) -> Option<String> {
 /// Writes the newest film where the user wanted pictures, or wherever it can be written; where that is.
 fn rescue(viewer: &Viewer) -> Option<PathBuf> {
     let name = format!("sunfleck-{}.exr", std::process::id());
-    let places = [viewer.output.clone(), Some(PathBuf::from(&name)), Some(std::env::temp_dir().join(&name))];
+    let places = [viewer.place().cloned(), Some(PathBuf::from(&name)), Some(std::env::temp_dir().join(&name))];
     places.into_iter().flatten().find(|path| viewer.engine().save_and_wait(&viewer.saving_to(path.clone())).is_ok())
 }
 

@@ -119,14 +119,14 @@ impl Opened {
         self.loaded.scene.bounds().into_iter().chain(spheres).reduce(union).unwrap_or([-0.5, 0.5].map(Vec3::splat))
     }
 
-    /// What renders this scene with `settings` on the command line; `backend` as [`Device::backend`] says.
-    pub fn command(&self, settings: &Settings, backend: &str, iterations: u32, output: &Path) -> String {
+    /// What renders this scene with `settings` on the command line, on the device that the flags say.
+    pub fn command(&self, settings: &Settings, device_flags: &str, iterations: u32, output: &Path) -> String {
         let mut command = format!("sunfleck render {}", crate::render::quote(&self.source.name));
         for pair in settings.difference(&self.read) {
             command += &format!(" --set {}", crate::render::quote(&pair));
         }
         let output = crate::render::quote(&output.to_string_lossy());
-        format!("{command} --backend {backend} --iterations {} -o {output}", iterations.max(1))
+        format!("{command} {device_flags} --iterations {} -o {output}", iterations.max(1))
     }
 }
 
@@ -150,6 +150,8 @@ pub enum Message {
 #[derive(Default)]
 struct Board {
     wanted: Wanted,
+    /// To be written.
+    saves: Vec<Save>,
     reference: Option<Arc<Reference>>,
     /// Of a picture that the window can show, pixels.
     most_side: Option<usize>,
@@ -286,10 +288,11 @@ impl Engine {
         });
         let (backend, has_ray_queries) = (device.backend(), device.has_ray_queries());
         let named = |name: &str| std::thread::Builder::new().name(name.to_owned());
-        let (render, paint) = (Arc::clone(&shared), Arc::clone(&shared));
+        let [render, paint, write] = std::array::from_fn(|_| Arc::clone(&shared));
         let threads = vec![
             named("render").spawn(move || worker::run(&render, device))?,
             named("paint").spawn(move || painting::run(&paint))?,
+            named("write").spawn(move || saving::run(&write))?,
         ];
         Ok(Self { shared, backend, has_ray_queries, threads })
     }
@@ -311,31 +314,22 @@ impl Engine {
         }
     }
 
-    /// Writes the newest film on a thread of its own: no iteration is waited for, none is held up. A message says how it
-    /// went.
-    pub fn save(&mut self, save: Save) {
-        let (newest, shared) = (self.newest(), Arc::clone(&self.shared));
-        self.threads.retain(|thread| !thread.is_finished());
-        self.threads.push(std::thread::spawn(move || {
-            let message = match newest.and_then(|newest| newest.write(&save)) {
-                Ok(n) => Message::Said(format!("saved {} after {n} iterations", save.path.display())),
-                Err(error) => Message::Error(crate::one_line(&crate::chain(&error))),
-            };
-            shared.update(|board| board.messages.push(message));
-        }));
+    /// Writes the newest picture on a thread of its own, as soon as there is one; a message says how it went. Asked again
+    /// before it is written, it is written once.
+    pub fn save(&self, save: Save) {
+        self.shared.redirect(|board| {
+            board.saves.retain(|other| other.path != save.path);
+            board.saves.push(save);
+        });
     }
 
-    /// The same, and comes back when that is done: for the end.
+    /// Writes what there is, and comes back when that is done: for the end.
     pub fn save_and_wait(&self, save: &Save) -> Result<()> {
-        self.newest()?.write(save).map(|_| ())
-    }
-
-    fn newest(&self) -> Result<saving::Newest> {
-        let board = self.shared.board();
-        // The film of a scene that has been left stays until the render thread comes to its end.
-        let frame = board.frame.clone().filter(|frame| Some(&frame.opened.choice) == board.wanted.scene.as_ref());
-        let frame = frame.context("there is no picture yet")?;
-        Ok(saving::Newest { frame, device: board.device.clone() })
+        let newest = {
+            let board = self.shared.board();
+            board.frame.as_ref().map(|frame| saving::Newest::of(frame, &board.device))
+        };
+        newest.context("there is no picture yet")?.write(save).map(|_| ())
     }
 
     /// Larger pictures are shown reduced, pixels a side.

@@ -1,13 +1,17 @@
-//! A film on its way to a file.
+//! The write thread: pictures on their way to files.
+//!
+//! It waits for no iteration, and holds none up. While the camera moves there are but previews: the picture is written when
+//! there is one.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::Result;
 use sunfleck::output;
 use sunfleck::output::display::Look;
 
-use super::Frame;
+use super::{Board, Choice, Frame, Message, Phase, Shared, catch};
+use crate::job;
 
 /// What to write, and where.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,27 +19,59 @@ pub struct Save {
     /// `.exr` or `.png`.
     pub path: PathBuf,
     pub look: Look,
+    /// Whose picture it is.
+    pub scene: Option<Arc<Choice>>,
+    /// The command line's flags for the device.
+    pub device_flags: String,
+}
+
+/// What can be done about a save.
+enum Now {
+    Write(Newest),
+    Refuse(&'static str),
+    Wait,
 }
 
 /// The newest film that was read back, and what rendered it.
 pub struct Newest {
-    pub frame: Arc<Frame>,
-    pub device: String,
+    frame: Arc<Frame>,
+    device: String,
+}
+
+impl Save {
+    fn now(&self, board: &Board) -> Now {
+        if self.scene != board.wanted.scene {
+            return Now::Refuse("its scene was left before there was a picture of it");
+        }
+        let frame = board.frame.as_ref().filter(|frame| Some(&frame.opened.choice) == self.scene.as_ref());
+        let has_failed = matches!(board.phase, Phase::Failed(_));
+        match frame.filter(|frame| !frame.is_preview || has_failed) {
+            Some(frame) => Now::Write(Newest::of(frame, &board.device)),
+            None if has_failed || board.quit || self.scene.is_none() => Now::Refuse("there is no picture yet"),
+            None => Now::Wait,
+        }
+    }
 }
 
 impl Newest {
+    pub fn of(frame: &Arc<Frame>, device: &str) -> Self {
+        Self { frame: Arc::clone(frame), device: device.to_owned() }
+    }
+
     /// Returns the number of its iterations.
     pub fn write(self, save: &Save) -> Result<u32> {
         let Self { frame, device } = self;
         let (film, params) = (&frame.film, &frame.params);
         let picture = frame.picture();
-        if is_png(&save.path) {
+        if job::is_png(&save.path) {
             output::png::write(&save.path, &picture, &save.look)?;
         } else {
             let header = output::exr::Header {
                 scene: frame.opened.source.name.clone(),
-                command: frame.opened.command(&frame.settings, frame.backend, film.n_iterations, &save.path),
+                command: frame.opened.command(&frame.settings, &save.device_flags, film.n_iterations, &save.path),
                 adapter: device,
+                index: frame.index.clone(),
+                accelerator: frame.scene.accelerator().to_string(),
                 seed: params.seed,
                 alpha: params.alpha,
                 first_radius: frame.first_radius,
@@ -51,6 +87,31 @@ impl Newest {
     }
 }
 
-fn is_png(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"))
+/// Until the interface is gone and all is written.
+pub fn run(shared: &Shared) {
+    let is_ready = |board: &Board| board.saves.iter().position(|save| !matches!(save.now(board), Now::Wait));
+    loop {
+        let (save, now) = {
+            let mut board = shared.wait_until(|board| is_ready(board).is_some());
+            let Some(i) = is_ready(&board) else { break };
+            let save = board.saves.remove(i);
+            let now = save.now(&board);
+            (save, now)
+        };
+        let path = save.path.display();
+        let done = match now {
+            Now::Write(newest) => catch(|| newest.write(&save).map_err(|error| crate::one_line(&crate::chain(&error)))),
+            Now::Refuse(why) => Ok(Err(format!("{path} was not written: {why}"))),
+            Now::Wait => continue,
+        };
+        let message = match done.flatten() {
+            Ok(n) => Message::Said(format!("saved {path} after {n} iterations")),
+            Err(error) => Message::Error(error),
+        };
+        shared.update(|board| match message {
+            // There is no window any more to tell it in.
+            Message::Error(error) if board.quit => crate::say_error(&error),
+            message => board.messages.push(message),
+        });
+    }
 }

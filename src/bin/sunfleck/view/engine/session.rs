@@ -38,8 +38,8 @@ pub struct Frame {
     /// What it is an estimate of.
     pub opened: Arc<Opened>,
     pub settings: Arc<Settings>,
-    /// `cpu` or `gpu`.
-    pub backend: &'static str,
+    /// What found photons: `tree` or `hardware`.
+    pub index: String,
     /// `[h·w]`, metres.
     pub first_radii: Arc<Vec<f32>>,
     /// Read back only where something shown needs it.
@@ -77,7 +77,7 @@ pub struct Session {
     /// What `input` was made with.
     pub settings: Arc<Settings>,
     scene: Arc<PackedScene>,
-    backend: &'static str,
+    index: String,
     stages: Box<dyn Stages>,
     estimate: u64,
     params: Params,
@@ -113,7 +113,7 @@ impl Session {
             input,
             settings,
             scene,
-            backend: device.backend(),
+            index: device.index(),
             stages,
             estimate: 0,
             params,
@@ -229,7 +229,7 @@ impl Session {
             scene: Arc::clone(&self.scene),
             opened: Arc::clone(&self.opened),
             settings: Arc::clone(&self.settings),
-            backend: self.backend,
+            index: self.index.clone(),
             first_radii: self.radii.clone().unwrap_or_default(),
             insides: None,
             first_radius: self.first_radius,

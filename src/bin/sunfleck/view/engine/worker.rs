@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use anyhow::Result;
 use sunfleck::ppm::Error;
-use sunfleck::scene::settings::Settings;
+use sunfleck::scene::Accelerator;
+use sunfleck::scene::settings::{Index, Settings};
 
 use super::session::Session;
 use super::{Board, Choice, Message, Opened, Phase, Shared, Wanted, catch, is_same};
@@ -261,7 +262,14 @@ fn is_rendered_alike(opened: &Opened, before: &Wanted, now: &Wanted) -> bool {
 /// Those settings that the estimate depends on.
 fn rendered(opened: &Opened, wanted: &Wanted) -> Settings {
     let settings = wanted.settings.as_deref().unwrap_or(&opened.source.settings);
-    Settings { exposure: None, iterations: None, seconds: None, ..settings.clone() }
+    Settings { exposure: None, iterations: None, seconds: None, ..searched(settings) }
+}
+
+/// The same, with nothing in the place of the default ways to search.
+fn searched(settings: &Settings) -> Settings {
+    let index = settings.index.filter(|&index| index != Index::default());
+    let accel = settings.accel.filter(|&accel| accel != Accelerator::default());
+    Settings { index, accel, ..settings.clone() }
 }
 
 /// Those settings that change the scene or how it is searched: not the camera, not the rest of the estimator's.
@@ -279,6 +287,6 @@ fn of_scene(settings: &Settings) -> Settings {
         exposure: None,
         max_segments: None,
         camera: None,
-        ..settings.clone()
+        ..searched(settings)
     }
 }

@@ -16,7 +16,7 @@ fn files_dropped_at_once_are_each_taken_or_named() {
     window.wait_for_message("saved ");
     std::fs::write(&scene, "scene = \"cornell\"\nsize = [16, 12]\nphotons = 200\n").unwrap();
     window.drop_files(["readme.txt".into(), picture, scene, second]);
-    assert!(window.shows("readme.txt: neither a scene") && window.shows("second.toml is left out"));
+    assert!(window.shows("readme.txt: neither a scene") && window.shows("second.toml: left out"));
     window.wait("both", |viewer| {
         viewer.now.reference.is_some() && viewer.now.painted.as_ref().is_some_and(|painted| painted.size == [16, 12])
     });
@@ -50,6 +50,12 @@ fn a_narrow_window_keeps_the_picture() {
         window.steps(3);
         assert_eq!((window.shows("Estimator"), window.shows("Under the cursor")), (true, both), "{width}");
         assert!(window.viewer().picture.area.is_some_and(|area| area.width() >= 160.0), "{width}");
+    }
+    window.harness.set_size([480.0, 320.0].into());
+    for shown in [(false, true), (false, false), (false, true)] {
+        window.press(Modifiers::NONE, Key::F2);
+        window.steps(2);
+        assert_eq!((window.shows("Estimator"), window.shows("Under the cursor")), shown);
     }
 }
 

@@ -35,7 +35,7 @@ struct Vandal {
     frames: usize,
     /// Estimate and iterations when the device was lost.
     before: Option<(u64, u32)>,
-    /// The same in the last window, and its messages.
+    /// The same in the last window, and what all of them told.
     after_all: Option<(u64, u32)>,
     messages: Vec<String>,
     began: Instant,
@@ -80,6 +80,11 @@ impl Guest for Vandal {
             (self.windows, self.frames) = (self.windows + 1, 0);
         }
         self.frames += 1;
+        for text in viewer.messages.texts() {
+            if !self.messages.iter().any(|said| said == text) {
+                self.messages.push(text.to_owned());
+            }
+        }
         let Some(at) = viewer.now.frame.as_ref().map(|frame| (frame.estimate, frame.film.n_iterations)) else { return };
         if self.windows <= self.breaks {
             self.before = Some(at);
@@ -89,7 +94,6 @@ impl Guest for Vandal {
         } else if viewer.picture.painted().is_some() && self.before.is_some_and(|(_, n)| at.1 > n) {
             // It shows what was rendered after the loss.
             self.after_all = Some(at);
-            self.messages = viewer.messages.texts().map(str::to_owned).collect();
             ui.ctx().send_viewport_cmd(Close);
         }
     }
