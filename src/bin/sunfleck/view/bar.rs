@@ -223,7 +223,8 @@ pub fn status(ui: &mut egui::Ui, viewer: &Viewer) {
             }
         }
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            ui.label(&now.device).on_hover_text(format!("What renders.\n{}", viewer.timing.text()));
+            ui.add(egui::Label::new(&now.device).truncate())
+                .on_hover_text(format!("What renders.\n{}", viewer.timing.text()));
         });
     });
 }

@@ -18,6 +18,9 @@ const MOST_POINTS: usize = 500;
 /// Width below which fewer plots stand side by side, points.
 const LEAST_WIDTH: f32 = 210.0;
 
+/// Width that the errors need beside the choice of plots, points.
+const FIGURES_WIDTH: f32 = 260.0;
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
     Error,
@@ -175,7 +178,7 @@ fn heading(ui: &mut egui::Ui, view: &mut Convergence, (_, estimated, measured, _
                 .iter()
                 .filter_map(|(what, last)| Some(format!("{what} {:.2e}", last.as_ref()?.rel_mse)))
                 .collect::<Vec<_>>();
-            if !text.is_empty() {
+            if !text.is_empty() && ui.available_width() >= FIGURES_WIDTH {
                 ui.label(format!("relMSE {}", text.join(", "))).on_hover_text(Kind::Error.describe());
             }
         });

@@ -105,6 +105,7 @@ pub fn run(shared: &Shared) {
             Now::Wait => continue,
         };
         let message = match done.flatten() {
+            Ok(1) => Message::Said(format!("saved {path} after 1 iteration")),
             Ok(n) => Message::Said(format!("saved {path} after {n} iterations")),
             Err(error) => Message::Error(error),
         };
