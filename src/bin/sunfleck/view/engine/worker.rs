@@ -111,12 +111,9 @@ impl Have {
             (self.session, self.opened) = (None, None);
             shared.update(|board| {
                 (board.opened, board.frame, board.painted) = (None, None, None);
-                board.phase = Phase::Loading;
+                board.phase = if wanted.scene.is_some() { Phase::Loading } else { Phase::Empty };
             });
-            let Some(choice) = &wanted.scene else {
-                shared.update(|board| board.phase = Phase::Empty);
-                return Ok(());
-            };
+            let Some(choice) = &wanted.scene else { return Ok(()) };
             let opened = Arc::new(open(choice)?);
             self.opened = Some(Arc::clone(&opened));
             shared.update(|board| {
