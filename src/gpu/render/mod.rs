@@ -148,8 +148,8 @@ impl GpuStages {
         })
     }
 
-    /// How long one dispatch of eye paths, photon paths or the gather is to take at most, seconds (if never called 0.1, or 0.01 with an interrupt):
-    /// short ones let whoever shares the device have a turn. It is aimed at from what [`Stages::times`] last read, down to
+    /// How long one dispatch of eye paths, photon paths or the gather is to take at most, seconds (if never called 0.1, or
+    /// 0.01 with an interrupt): short ones let whoever shares the device have a turn. It is aimed at from what [`Stages::times`] last read, down to
     /// a smallest dispatch, and changes no bit of the picture.
     pub fn set_dispatch_seconds(&mut self, seconds: f64) {
         self.dispatch_seconds = seconds.max(0.0);

@@ -89,8 +89,6 @@ pub struct Viewer {
     pub previous: Option<Arc<Choice>>,
     /// Of [`First`].
     always: Vec<String>,
-    /// Of the last frame, seconds, by the window's clock.
-    pub time: f64,
     /// Of a texture, pixels.
     most_side: usize,
     /// Of the window.
@@ -130,7 +128,6 @@ impl Viewer {
             timing: Default::default(),
             previous: None,
             always: first.always,
-            time: 0.0,
             most_side: 0,
             title: String::new(),
             messages: Messages::default(),
@@ -401,7 +398,6 @@ impl Viewer {
             self.engine.set_most_side(most_side);
         }
         let time = ui.input(|i| i.time);
-        self.time = time;
         self.engine.take_messages().into_iter().for_each(|message| self.messages.say(time, message));
         if !is_same(self.editing.as_ref(), self.now.opened.as_ref()) {
             self.selected = None;

@@ -95,7 +95,7 @@ fn ask(viewer: &mut Viewer, purpose: Purpose) {
     if viewer.dialog.is_some() {
         // Some systems never answer.
         let text = "a file dialog is open already; sunfleck view SCENE -o FILE saves without one".to_owned();
-        return viewer.messages.say(viewer.time, Message::Warning(text));
+        return viewer.engine().speaker()(Message::Warning(text));
     }
     let (sender, answer) = mpsc::channel();
     let stem = viewer

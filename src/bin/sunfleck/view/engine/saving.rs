@@ -25,13 +25,6 @@ pub struct Save {
     pub device_flags: String,
 }
 
-/// What can be done about a save.
-enum Now {
-    Write(Newest),
-    Refuse(&'static str),
-    Wait,
-}
-
 /// The newest film that was read back, and what rendered it.
 pub struct Newest {
     frame: Arc<Frame>,
@@ -39,16 +32,17 @@ pub struct Newest {
 }
 
 impl Save {
-    fn now(&self, board: &Board) -> Now {
+    /// What is to be written, or why nothing is; none as long as that is to be seen.
+    fn ready(&self, board: &Board) -> Option<Result<Newest, &'static str>> {
         if self.scene != board.wanted.scene {
-            return Now::Refuse("its scene was left before there was a picture of it");
+            return Some(Err("its scene was left before there was a picture of it"));
         }
         let frame = board.frame.as_ref().filter(|frame| Some(&frame.opened.choice) == self.scene.as_ref());
         let has_failed = matches!(board.phase, Phase::Failed(_));
         match frame.filter(|frame| !frame.is_preview || has_failed) {
-            Some(frame) => Now::Write(Newest::of(frame, &board.device)),
-            None if has_failed || board.quit || self.scene.is_none() => Now::Refuse("there is no picture yet"),
-            None => Now::Wait,
+            Some(frame) => Some(Ok(Newest::of(frame, &board.device))),
+            None if has_failed || board.quit || self.scene.is_none() => Some(Err("there is no picture yet")),
+            None => None,
         }
     }
 }
@@ -89,20 +83,20 @@ impl Newest {
 
 /// Until the interface is gone and all is written.
 pub fn run(shared: &Shared) {
-    let is_ready = |board: &Board| board.saves.iter().position(|save| !matches!(save.now(board), Now::Wait));
+    let next = |board: &Board| {
+        let mut saves = board.saves.iter().enumerate();
+        saves.find_map(|(i, save)| Some((i, save.ready(board)?)))
+    };
     loop {
-        let (save, now) = {
-            let mut board = shared.wait_until(|board| is_ready(board).is_some());
-            let Some(i) = is_ready(&board) else { break };
-            let save = board.saves.remove(i);
-            let now = save.now(&board);
-            (save, now)
+        let (save, newest) = {
+            let mut board = shared.wait_until(|board| next(board).is_some());
+            let Some((i, newest)) = next(&board) else { break };
+            (board.saves.remove(i), newest)
         };
         let path = save.path.display();
-        let done = match now {
-            Now::Write(newest) => catch(|| newest.write(&save).map_err(|error| crate::one_line(&crate::chain(&error)))),
-            Now::Refuse(why) => Ok(Err(format!("{path} was not written: {why}"))),
-            Now::Wait => continue,
+        let done = match newest {
+            Ok(newest) => catch(|| newest.write(&save).map_err(|error| crate::one_line(&crate::chain(&error)))),
+            Err(why) => Ok(Err(format!("{path} was not written: {why}"))),
         };
         let message = match done.flatten() {
             Ok(1) => Message::Said(format!("saved {path} after 1 iteration")),
