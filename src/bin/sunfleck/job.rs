@@ -7,7 +7,7 @@ use sunfleck::layout::EyeVertex;
 use sunfleck::output::atomic;
 use sunfleck::output::png::Look;
 use sunfleck::ppm::{Direct, FirstRadius, Kernel, Params};
-use sunfleck::scene::defaults::{add_default_light, default_camera};
+use sunfleck::scene::defaults::add_default_light;
 use sunfleck::scene::load::{Loaded, load_environment};
 use sunfleck::scene::{Camera, Scene, Settings, settings};
 
@@ -110,24 +110,17 @@ pub fn prepare(source: &Source, settings: &Settings, mut loaded: Loaded, args: &
     source.apply(&settings, &mut loaded)?;
     let Loaded { mut scene, mut warnings } = loaded;
     warnings.extend(add_default_light(&mut scene));
-    if scene.cameras.is_empty() {
-        scene.cameras.push(default_camera(&scene));
-    }
     scene.check().with_context(|| source.name.clone())?;
     let camera = camera(&scene, args.camera.as_deref())?;
     let params = params(&settings, args, &camera)?;
     Ok(Input { scene, camera, params, warnings })
 }
 
-/// The same for settings that change the scene as those did that `input` was made with; `as_read` is the scene before
-/// them. Nothing is copied: the camera may move at every frame of a window.
+/// The same for settings that change the scene as those did that `input` was made with; `cameras` are the scene's before
+/// them. The scene is not looked at: the camera may move at every frame of a window.
 #[cfg(feature = "view")]
-pub fn prepare_again(input: &mut Input, settings: &Settings, as_read: &Scene) -> Result<()> {
-    let cameras = match as_read.cameras.is_empty() {
-        true => vec![default_camera(&input.scene)],
-        false => as_read.cameras.clone(),
-    };
-    let camera = settings.camera_of(&Scene { cameras, ..Scene::default() })?;
+pub fn prepare_again(input: &mut Input, settings: &Settings, cameras: &[Camera]) -> Result<()> {
+    let camera = settings.camera_of(cameras)?;
     camera.check()?;
     input.params = params(settings, &InputArgs::default(), &camera)?;
     input.camera = camera;
@@ -317,7 +310,7 @@ mod tests {
         let source = Source::resolve("cornell").unwrap();
         let loaded = source.scene().unwrap();
         let args = InputArgs::default();
-        let as_read = loaded.scene.clone();
+        let cameras = loaded.scene.cameras.clone();
         let first = prepare(&source, &source.settings, loaded.clone(), &args).unwrap();
         let mut settings = source.settings.clone();
         settings.size = Some(Size([32, 16]));
@@ -339,14 +332,14 @@ mod tests {
         let mut again = prepare(&source, &source.settings, source.scene().unwrap(), &args).unwrap();
         settings.camera = Some(CameraSettings { position: Some([0.5, 1.0, 3.0]), ..CameraSettings::default() });
         for _ in 0..2 {
-            prepare_again(&mut again, &settings, &as_read).unwrap();
+            prepare_again(&mut again, &settings, &cameras).unwrap();
             let whole = prepare(&source, &settings, source.scene().unwrap(), &args).unwrap();
             assert_eq!((again.params.size, again.params.n_paths), (whole.params.size, whole.params.n_paths));
             assert_eq!(again.camera.pack(4, 3), whole.camera.pack(4, 3));
             settings.camera = None;
         }
         settings.alpha = Some(2.0);
-        assert!(prepare_again(&mut again, &settings, &as_read).is_err());
+        assert!(prepare_again(&mut again, &settings, &cameras).is_err());
         settings.alpha = None;
         settings.set("material.none.ior=2").unwrap();
         let error = prepare(&source, &settings, source.scene().unwrap(), &args).err().map(|e| crate::chain(&e));
@@ -354,5 +347,30 @@ mod tests {
             error.as_ref().is_some_and(|e| e.contains("cornell: material[1].name: there is no material")),
             "{error:?}"
         );
+    }
+
+    /// The camera that is made for a scene without one is the same to all, and is not moved by edits of the light.
+    #[test]
+    fn the_window_and_the_command_line_frame_a_scene_alike() {
+        let source = Source::resolve("cornell").unwrap();
+        let mut read = source.scene().unwrap();
+        read.scene.cameras.clear();
+        let mut settings = Settings::default();
+        settings.set("sphere.0={centre = [0, 9, 0], radius = 2}").unwrap();
+        let mut framed = read.clone();
+        settings.add_default_camera(&mut framed.scene);
+        let cameras = framed.scene.cameras.clone();
+        assert_eq!(cameras.len(), 1);
+        let args = InputArgs::default();
+        let mut input = prepare(&source, &settings, read.clone(), &args).unwrap();
+        assert_eq!(input.camera.pack(4, 3), cameras[0].pack(4, 3));
+        let without = prepare(&source, &Settings::default(), read.clone(), &args).unwrap();
+        assert_ne!(without.camera.pack(4, 3), cameras[0].pack(4, 3));
+        settings.light_scale = Some(0.0);
+        settings.set("environment.color=[1, 1, 1]").unwrap();
+        let other = prepare(&source, &settings, read, &args).unwrap();
+        prepare_again(&mut input, &settings, &cameras).unwrap();
+        assert_eq!(other.camera.pack(4, 3), input.camera.pack(4, 3));
+        assert_eq!(other.camera.pack(4, 3), cameras[0].pack(4, 3));
     }
 }

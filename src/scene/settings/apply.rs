@@ -124,6 +124,7 @@ impl Settings {
     ) -> Result<Vec<String>, SettingsError> {
         let wrong = |(field, problem): Wrong| SettingsError::Field { field, problem };
         self.check_values().map_err(wrong)?;
+        self.add_default_camera(scene);
         let mut warnings = Vec::new();
         for (i, material) in self.materials.iter().enumerate() {
             material.apply(&mut scene.materials, &format!("material[{i}]")).map_err(wrong)?;
@@ -142,7 +143,7 @@ impl Settings {
             scale_lights(scene, factor);
         }
         if let Some(camera) = &self.camera {
-            camera.apply(scene).map_err(wrong)?;
+            camera.apply(&mut scene.cameras).map_err(wrong)?;
         }
         Ok(warnings)
     }
@@ -161,16 +162,28 @@ fn scale_lights(scene: &mut Scene, factor: f32) {
 }
 
 impl Settings {
-    /// The camera that these settings make of those of `scene`, which is as its file has it.
-    pub fn camera_of(&self, scene: &Scene) -> Result<Camera, SettingsError> {
+    /// Gives a scene without a camera, which is as its file has it, the default one, as applying these settings does. It
+    /// has their spheres in view, and depends on nothing else in them: it stays where it is while they are edited.
+    pub fn add_default_camera(&self, scene: &mut Scene) {
+        if scene.cameras.is_empty() {
+            scene.cameras.push(default_camera(scene, &self.spheres()));
+        }
+    }
+
+    /// Where spheres are added; all of material 0.
+    pub fn spheres(&self) -> Vec<Sphere> {
+        let sphere =
+            |s: &SphereSettings| Sphere { centre: s.centre.into(), radius: s.radius, inward: s.inward, material: 0 };
+        self.spheres.iter().map(sphere).collect()
+    }
+
+    /// The camera that these settings make of those of a scene.
+    pub fn camera_of(&self, cameras: &[Camera]) -> Result<Camera, SettingsError> {
         let wrong = |(field, problem): Wrong| SettingsError::Field { field, problem };
         self.check_values().map_err(wrong)?;
-        let cameras = if scene.cameras.is_empty() { vec![default_camera(scene)] } else { scene.cameras.clone() };
-        let mut cameras = Scene { cameras, ..Scene::default() };
-        if let Some(camera) = &self.camera {
-            camera.apply(&mut cameras).map_err(wrong)?;
-        }
-        Ok(cameras.cameras.swap_remove(0))
+        let mut cameras = cameras.to_vec();
+        self.camera.clone().unwrap_or_default().apply(&mut cameras).map_err(wrong)?;
+        Ok(cameras.swap_remove(0))
     }
 }
 
@@ -196,24 +209,18 @@ impl CameraSettings {
     }
 
     /// Puts the camera first.
-    fn apply(&self, scene: &mut Scene) -> Result<(), Wrong> {
-        let chosen = match &self.name {
-            None => (!scene.cameras.is_empty()).then_some(0),
-            Some(name) => match position(&scene.cameras, name) {
-                Some(found) => Some(found),
-                None => {
-                    let list: Vec<_> =
-                        scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} {:?}", c.name)).collect();
-                    let list = if list.is_empty() { "none".to_owned() } else { list.join(", ") };
-                    let problem = format!("there is no camera {name:?}; there is {list}");
-                    return Err(("camera.name".into(), problem));
-                }
-            },
+    fn apply(&self, cameras: &mut Vec<Camera>) -> Result<(), Wrong> {
+        let missing = |name: &str| {
+            let list: Vec<_> = cameras.iter().enumerate().map(|(i, c)| format!("{i} {:?}", c.name)).collect();
+            let list = if list.is_empty() { "none".to_owned() } else { list.join(", ") };
+            ("camera.name".to_owned(), format!("there is no camera {name:?}; there is {list}"))
         };
-        let mut camera = match chosen {
-            Some(index) => scene.cameras.remove(index),
-            None => default_camera(scene),
+        let name = self.name.as_deref().unwrap_or("0");
+        let chosen = match self.name {
+            None => (!cameras.is_empty()).then_some(0),
+            Some(_) => position(cameras, name),
         };
+        let mut camera = cameras.remove(chosen.ok_or_else(|| missing(name))?);
         if let Some(position) = self.position {
             camera.world_from_camera.translation = position.into();
         }
@@ -239,7 +246,7 @@ impl CameraSettings {
         }
         camera.aperture_radius = self.aperture_radius.unwrap_or(camera.aperture_radius);
         camera.focus_distance = self.focus_distance.unwrap_or(camera.focus_distance);
-        scene.cameras.insert(0, camera);
+        cameras.insert(0, camera);
         Ok(())
     }
 }

@@ -267,7 +267,7 @@ impl Viewer {
 
     /// Moves the camera until the whole scene is in the picture.
     pub fn frame_all(&mut self, time: f64) {
-        let Some(bounds) = self.editing.as_ref().map(|opened| opened.bounds()) else { return };
+        let Some(bounds) = self.editing.as_ref().map(|opened| opened.bounds) else { return };
         let Some([width, height]) = self.full_size() else { return };
         self.move_rig(time, &mut |rig| rig.frame_all(bounds, width as f32 / height as f32));
     }
@@ -293,7 +293,7 @@ impl Viewer {
 
     /// The camera that the settings make.
     pub fn camera(&self) -> Option<Camera> {
-        self.edits.now().camera_of(&self.editing.as_ref()?.loaded.scene).ok()
+        self.edits.now().camera_of(&self.editing.as_ref()?.loaded.scene.cameras).ok()
     }
 
     /// Writes the picture to `path`, as it looks now.

@@ -51,16 +51,23 @@ impl Rig {
     pub fn new(camera: &Camera, bounds: [Vec3; 2]) -> Self {
         let mut rig = Self { camera: camera.clone(), pivot: Vec3::ZERO, up: Vec3::Y, size: size(bounds) };
         let [right, above, forward] = rig.frame();
-        let is_tilted = right.y.abs() > TILTED;
-        rig.up = match is_tilted {
-            true => above,
-            false => Vec3::Y * if above.y < -TILTED { -1.0 } else { 1.0 },
-        };
+        rig.up = up(right, above);
         let depth = (0.5 * (bounds[0] + bounds[1]) - rig.position()).dot(forward);
         let in_front = depth.is_finite() && depth > 0.01 * rig.size;
         let depth = if in_front { depth } else { camera.focus_distance };
         rig.pivot = rig.position() + forward * depth.max(rig.nearest());
         rig
+    }
+
+    /// Takes over a camera with another lens that stands as this one; says whether it does. Pivot and up axis stay.
+    pub fn change_lens(&mut self, camera: &Camera) -> bool {
+        let [was, is] = [&self.camera, camera].map(|camera| camera.world_from_camera);
+        // Axes may come back from settings with other roundings.
+        let stands = was.translation == is.translation && was.matrix3.abs_diff_eq(is.matrix3, 1e-6);
+        if stands {
+            self.camera = camera.clone();
+        }
+        stands
     }
 
     /// For rendering; name and aspect ratio are those of the camera that was taken over.
@@ -74,6 +81,7 @@ impl Rig {
     }
 
     /// What orbiting turns about and zooming approaches, world space, metres.
+    #[cfg(test)]
     pub fn pivot(&self) -> Vec3 {
         self.pivot
     }
@@ -280,6 +288,20 @@ impl Rig {
     }
 }
 
+/// What a camera turns about: the axis y or z that it is level with, or its own up. One that looks straight along y is
+/// held to look down on a map, north above, or to stand in a scene in which z is up.
+fn up(right: Vec3, above: Vec3) -> Vec3 {
+    let is_level = |axis: Vec3| right.dot(axis).abs() <= TILTED;
+    let along = |axis: Vec3| axis * if above.dot(axis) < -TILTED { -1.0 } else { 1.0 };
+    let is_z_up = above.y.abs() <= TILTED && above.z > 0.0;
+    match (is_level(Vec3::Y), is_level(Vec3::Z)) {
+        (true, true) if is_z_up => along(Vec3::Z),
+        (true, _) => along(Vec3::Y),
+        (false, true) => along(Vec3::Z),
+        (false, false) => above,
+    }
+}
+
 fn within(p: Vec3) -> bool {
     p.abs().max_element() <= MAX_COORDINATE && p.is_finite()
 }
@@ -480,6 +502,39 @@ mod tests {
                 prop_assert!((rig.position().distance(rig.pivot()) - wanted).abs() < 1e-3 * wanted);
             }
         }
+    }
+
+    #[test]
+    fn what_is_up() {
+        let up = |towards: [f32; 3], up: Vec3| {
+            Rig::new(&Camera::look_at("", towards.into(), Vec3::ZERO, up, 0.7), BOUNDS).up
+        };
+        for towards in [[0.0, 0.0, 5.0], [1.0, 2.0, 3.0], [0.0, 1e3, 2.0], [4.0, -1.0, 0.0]] {
+            assert_eq!(up(towards, Vec3::Y), Vec3::Y);
+            assert_eq!(up(towards, Vec3::NEG_Y), Vec3::NEG_Y);
+        }
+        // A map of the floor, and rooms in which z is up, from before them and from the side.
+        assert_eq!(up([0.0, 5.0, 0.0], Vec3::NEG_Z), Vec3::Y);
+        for towards in [[0.0, -5.0, 0.0], [0.0, 5.0, 0.0], [5.0, 0.0, 0.0], [3.0, 1.0, 2.0]] {
+            assert_eq!(up(towards, Vec3::Z), Vec3::Z, "{towards:?}");
+        }
+        let tilted = up([1.0, 2.0, 3.0], Vec3::new(0.3, 1.0, 0.2));
+        assert!(tilted.y > 0.5 && tilted.y < 0.999 && tilted.z.abs() > 0.01, "{tilted}");
+    }
+
+    #[test]
+    fn another_lens_leaves_pivot_and_axis() {
+        let camera = Camera::look_at("", Vec3::new(0.0, -5.0, 0.0), Vec3::ZERO, Vec3::Z, 0.7);
+        let mut rig = Rig::new(&camera, BOUNDS);
+        rig.orbit(0.0, 0.3);
+        rig.set_pivot(Vec3::ONE);
+        let mut wider = rig.camera().clone();
+        wider.projection = Projection::Perspective { yfov: 0.9 };
+        assert!(rig.change_lens(&wider));
+        assert_eq!((rig.pivot(), rig.up), (Vec3::ONE, Vec3::Z));
+        assert_eq!(rig.camera().projection, wider.projection);
+        wider.world_from_camera.translation.x += 1.0;
+        assert!(!rig.change_lens(&wider));
     }
 
     #[test]

@@ -312,20 +312,10 @@ impl Viewer {
         let settings = Arc::clone(self.edits.now());
         let known = self.picture.rig.as_ref().is_some_and(|(of, _)| Arc::ptr_eq(of, &settings));
         if !known {
-            let (camera, bounds) = (self.camera()?, self.opened()?.bounds());
-            let pivot = self
-                .picture
-                .rig
-                .take()
-                .map(|(_, rig)| rig)
-                .filter(|rig| rig.position() == Vec3::from(camera.world_from_camera.translation))
-                .map(|rig| rig.pivot());
-            let mut rig = Rig::new(&camera, bounds);
-            // A lens or a colour was changed, not the place.
-            if let Some(pivot) = pivot {
-                rig.set_pivot(pivot);
-            }
-            self.picture.rig = Some((settings, rig));
+            let (camera, bounds) = (self.camera()?, self.opened()?.bounds);
+            // Perhaps a lens or a colour was changed, not the place.
+            let kept = self.picture.rig.take().and_then(|(_, mut rig)| rig.change_lens(&camera).then_some(rig));
+            self.picture.rig = Some((settings, kept.unwrap_or_else(|| Rig::new(&camera, bounds))));
         }
         self.picture.rig.as_mut().map(|(_, rig)| rig)
     }

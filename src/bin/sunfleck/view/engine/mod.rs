@@ -105,20 +105,14 @@ pub struct Opened {
     pub source: Source,
     /// The settings as their file has them.
     pub read: Settings,
-    /// As the file has it, before settings.
+    /// As the file has it, before settings; with a camera if it has none.
     pub loaded: Loaded,
+    /// Least and greatest corner of the scene and of the spheres that its settings add, metres; those of a cube of side 1
+    /// about the origin if there is nothing.
+    pub bounds: [Vec3; 2],
 }
 
 impl Opened {
-    /// Least and greatest corner of the scene and of the spheres that its settings add, metres; those of a cube of side 1
-    /// about the origin if there is nothing.
-    pub fn bounds(&self) -> [Vec3; 2] {
-        let spheres =
-            self.source.settings.spheres.iter().map(|s| [-1.0, 1.0].map(|side| s.radius * side + Vec3::from(s.centre)));
-        let union = |[a, b]: [Vec3; 2], [c, d]: [Vec3; 2]| [a.min(c), b.max(d)];
-        self.loaded.scene.bounds().into_iter().chain(spheres).reduce(union).unwrap_or([-0.5, 0.5].map(Vec3::splat))
-    }
-
     /// What renders this scene with `settings` on the command line, on the device that the flags say.
     pub fn command(&self, settings: &Settings, device_flags: &str, iterations: u32, output: &Path) -> String {
         let mut command = format!("sunfleck render {}", crate::render::quote(&self.source.name));

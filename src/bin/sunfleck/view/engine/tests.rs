@@ -154,7 +154,7 @@ fn a_saved_picture_is_that_of_render_bit_for_bit() {
     // Another camera, looked for through a preview; then the same again by a restart.
     let moved = |settings: &mut Settings| {
         let opened = first.opened.as_ref().unwrap();
-        let mut camera = settings.camera_of(&opened.loaded.scene).unwrap();
+        let mut camera = settings.camera_of(&opened.loaded.scene.cameras).unwrap();
         camera.world_from_camera.translation.x += 0.05;
         settings.camera = Some(CameraSettings::from(&camera));
     };

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use anyhow::Result;
+use glam::Vec3;
 use sunfleck::ppm::Error;
 use sunfleck::scene::Accelerator;
 use sunfleck::scene::settings::{Index, Settings};
@@ -145,7 +146,7 @@ impl Have {
         };
         match self.session.as_mut().filter(|session| is_same_scene(session)) {
             Some(session) => {
-                job::prepare_again(&mut session.input, &settings, &opened.loaded.scene)?;
+                job::prepare_again(&mut session.input, &settings, &opened.loaded.scene.cameras)?;
                 session.settings = Arc::new(settings);
             }
             None => {
@@ -238,8 +239,10 @@ fn open(choice: &Arc<Choice>) -> Result<Opened> {
     let mut source = Source::resolve(&choice.name)?;
     let read = source.settings.clone();
     source.set(&choice.set)?;
-    let loaded = source.scene()?;
-    Ok(Opened { choice: Arc::clone(choice), source, read, loaded })
+    let mut loaded = source.scene()?;
+    source.settings.add_default_camera(&mut loaded.scene);
+    let bounds = loaded.scene.bounds(&source.settings.spheres()).unwrap_or([-0.5, 0.5].map(Vec3::splat));
+    Ok(Opened { choice: Arc::clone(choice), source, read, loaded, bounds })
 }
 
 fn is_other_scene(before: &Wanted, now: &Wanted) -> bool {

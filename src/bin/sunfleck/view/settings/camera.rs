@@ -90,7 +90,7 @@ fn which(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene) {
         Some(camera) => (0..scene.cameras.len()).find(|&i| is_chosen(scene, i, camera)),
     };
     let text = match current {
-        Some(i) => scene.cameras.get(i).map_or("framing the scene".to_owned(), |camera| title(camera, i)),
+        Some(i) => title(&scene.cameras[i], i),
         None if is_the_files => "the settings file's".to_owned(),
         None => "moved by hand".to_owned(),
     };
@@ -102,9 +102,6 @@ fn which(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene) {
                 if ui.selectable_label(current == Some(i), title(camera, i)).clicked() {
                     picked = Some(i);
                 }
-            }
-            if scene.cameras.is_empty() {
-                ui.label("The scene has none.");
             }
         });
         inside.response
@@ -132,7 +129,7 @@ fn file_of(viewer: &Viewer, read: &Settings, scene: &Scene) -> Option<File> {
     let moved = now.camera.as_ref().filter(|camera| Some(*camera) != read.camera.as_ref())?;
     // One of the scene's is changed in nothing.
     let is_whole = (0..scene.cameras.len()).any(|i| is_chosen(scene, i, moved));
-    let camera = read.camera_of(scene).ok().filter(|_| !is_whole)?;
+    let camera = read.camera_of(&scene.cameras).ok().filter(|_| !is_whole)?;
     Some(File { camera: (&camera).into(), read: read.camera.clone() })
 }
 
@@ -273,7 +270,7 @@ mod tests {
         let scene = Scene { cameras, ..Scene::default() };
         for i in 0..4 {
             let settings = Settings { camera: Some(chosen(&scene, i)), ..Settings::default() };
-            let found = settings.camera_of(&scene).unwrap();
+            let found = settings.camera_of(&scene.cameras).unwrap();
             assert_eq!(found.world_from_camera.translation.z, (i + 1) as f32);
             assert_eq!(chosen(&scene, i).name.is_some(), i < 2);
         }

@@ -1,0 +1,257 @@
+//! Where to look at a scene from that does not say.
+
+use super::view::Lamps;
+use crate::scene::{Camera, Scene, Sphere};
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Full vertical field of view, radians.
+const YFOV: f32 = 40_f32.to_radians();
+/// Half the field of view that is filled: a little air is left around the scene.
+const FILLED: f32 = 0.93 * 0.5 * YFOV;
+/// Azimuth and elevation that are taken unless much more light is seen from elsewhere, degrees: a little from the right,
+/// a little from above.
+const USUAL: [f32; 2] = [30.0, 20.0];
+/// A view is taken instead of one before it if this much more of it faces a lamp.
+const CLEARLY_MORE: f32 = 1.25;
+
+/// A camera that has the whole scene in view, and the spheres `more`, in pictures at least as wide as high, and as near as
+/// that lets it: a little from the right, a little from above. Rooms made of one inward sphere do not count as long as
+/// there is something else.
+///
+/// Where clearly more of what is seen faces a lamp from another side, as before a room of which a wall is left out,
+/// it stands there; also if z is up in that room.
+pub fn default_camera(scene: &Scene, more: &[Sphere]) -> Camera {
+    let outside = bounding_sphere(scene, more, false);
+    let with_inward = outside.is_none();
+    let (centre, radius) = outside.or_else(|| bounding_sphere(scene, more, true)).unwrap_or_default();
+    let radius = if radius > 0.0 { radius } else { 1.0 };
+    let framed = |view: View| {
+        let points = points(scene, more, with_inward).map(|(p, radius)| (p - centre, radius));
+        view.framing(points, centre, radius)
+    };
+    let usual = framed(View::y_up(USUAL));
+    let Some(lamps) = Lamps::of(scene) else { return usual };
+    let usual_share = lamps.share_of_view(scene, &usual);
+    if CLEARLY_MORE * usual_share >= 1.0 {
+        return usual;
+    }
+    let others: Vec<_> = View::others()
+        .into_par_iter()
+        .map(|view| {
+            let camera = framed(view);
+            (lamps.share_of_view(scene, &camera), camera)
+        })
+        .collect();
+    let better = |best: (f32, Camera), other: (f32, Camera)| match other.0 > CLEARLY_MORE * best.0 {
+        true => other,
+        false => best,
+    };
+    others.into_iter().fold((usual_share, usual), better).1
+}
+
+/// A direction to look from.
+#[derive(Clone, Copy)]
+struct View {
+    /// Unit, from the scene to the camera.
+    towards: Vec3,
+    /// Unit.
+    up: Vec3,
+}
+
+impl View {
+    /// Azimuth from +z towards +x and elevation, degrees; y is up.
+    fn y_up([azimuth, elevation]: [f32; 2]) -> Self {
+        let ((sin, cos), (rise, level)) = (azimuth.to_radians().sin_cos(), elevation.to_radians().sin_cos());
+        Self { towards: Vec3::new(sin * level, rise, cos * level), up: Vec3::Y }
+    }
+
+    /// Azimuth from −y towards +x, degrees; level, and z is up.
+    fn z_up(azimuth: f32) -> Self {
+        let (sin, cos) = azimuth.to_radians().sin_cos();
+        Self { towards: Vec3::new(sin, -cos, 0.0), up: Vec3::Z }
+    }
+
+    /// Better ones for most scenes first.
+    fn others() -> Vec<Self> {
+        let sides = [0.0, 30.0, 90.0, 180.0, 270.0];
+        let y_up = [20.0, 0.0, 60.0].into_iter().flat_map(|elevation| sides.map(|side| Self::y_up([side, elevation])));
+        y_up.chain(sides.map(Self::z_up)).collect()
+    }
+
+    /// The camera of this view that shows all points, relative to `centre`, with their radii; they lie within `radius` of
+    /// it.
+    fn framing(self, points: impl Iterator<Item = (Vec3, f32)>, centre: Vec3, radius: f32) -> Camera {
+        let towards = self.towards;
+        let right = self.up.cross(towards).normalize();
+        let up = towards.cross(right);
+        // A point stays inside a side of the frustum if distance·tan ≥ depth·tan ± (offset along the axis); the two sides
+        // of an axis together give the distance, and what differs between them is where the middle of the picture should
+        // be.
+        let (tan, secant) = (FILLED.tan(), 1.0 / FILLED.cos());
+        let mut sides = [f32::NEG_INFINITY; 4];
+        for (q, radius) in points {
+            let base = q.dot(towards) * tan + radius * secant;
+            let (x, y) = (q.dot(right), q.dot(up));
+            for (side, offset) in sides.iter_mut().zip([x, -x, y, -y]) {
+                *side = side.max(base + offset);
+            }
+        }
+        let [right_side, left_side, top, bottom] = if sides[0].is_finite() { sides } else { [radius; 4] };
+        // A speck has no size of its own.
+        let distance = ((right_side + left_side).max(top + bottom) * 0.5 / tan).max(1e-3 * radius);
+        let target = centre + right * (0.5 * (right_side - left_side)) + up * (0.5 * (top - bottom));
+        Camera::look_at("default", target + towards * distance, target, self.up, YFOV)
+    }
+}
+
+/// Vertices, and spheres with their radii. Only vertices in use: files carry stray ones.
+fn points<'a>(scene: &'a Scene, more: &'a [Sphere], with_inward: bool) -> impl Iterator<Item = (Vec3, f32)> + 'a {
+    let vertices = scene
+        .meshes
+        .iter()
+        .flat_map(|mesh| mesh.triangles.iter().flatten().filter_map(move |&i| mesh.positions.get(i as usize).copied()));
+    let spheres = scene.spheres.iter().chain(more).filter(move |sphere| with_inward || !sphere.inward);
+    vertices.map(|p| (p, 0.0)).chain(spheres.map(|s| (s.centre, s.radius)))
+}
+
+impl Scene {
+    /// Least and greatest corner of all surfaces and of the spheres `more`, metres; none if there are none.
+    pub fn bounds(&self, more: &[Sphere]) -> Option<[Vec3; 2]> {
+        bounding_box(self, more, true)
+    }
+}
+
+fn bounding_box(scene: &Scene, more: &[Sphere], with_inward: bool) -> Option<[Vec3; 2]> {
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for (p, radius) in points(scene, more, with_inward) {
+        low = low.min(p - radius);
+        high = high.max(p + radius);
+    }
+    (low.is_finite() && high.is_finite()).then_some([low, high])
+}
+
+/// Centre of the bounding box of everything and the radius that reaches every point.
+fn bounding_sphere(scene: &Scene, more: &[Sphere], with_inward: bool) -> Option<(Vec3, f32)> {
+    let [low, high] = bounding_box(scene, more, with_inward)?;
+    let centre = 0.5 * (low + high);
+    let reach = points(scene, more, with_inward).map(|(p, radius)| p.distance(centre) + radius).fold(0.0, f32::max);
+    Some((centre, reach))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Environment, Material, Mesh, Projection, PunctualKind, PunctualLight};
+
+    #[test]
+    fn the_camera_sees_every_vertex() {
+        let positions: Vec<Vec3> = (0..8)
+            .map(|i| Vec3::new((i & 1) as f32 * 5.0, (i >> 1 & 1) as f32, (i >> 2) as f32 * 3.0) + 10.0)
+            .collect();
+        let mesh = Mesh { positions, triangles: vec![[0, 1, 2], [3, 4, 5], [5, 6, 7]], ..Mesh::default() };
+        let dome = Sphere { centre: Vec3::ZERO, radius: 1000.0, inward: true, material: 0 };
+        let scene = Scene { meshes: vec![mesh], spheres: vec![dome], ..Scene::default() };
+        let camera = default_camera(&scene, &[]);
+        let widest = widest(&camera, &scene.meshes[0].positions);
+        // And it comes near: the scene is wider than high.
+        assert!((0.9..=1.0).contains(&widest), "{widest}");
+        assert!(camera.focus_distance < 20.0);
+    }
+
+    /// How far from the middle of the picture the outermost point is; 1 is the edge.
+    fn widest(camera: &Camera, points: &[Vec3]) -> f32 {
+        let Projection::Perspective { yfov } = camera.projection else { panic!("a perspective camera") };
+        let inverse = camera.world_from_camera.inverse();
+        let at = points.iter().map(|&p| {
+            let [x, y, z] = inverse.transform_point3(p).to_array();
+            assert!(z < 0.0, "{p}");
+            x.abs().max(y.abs()) / (-z * (0.5 * yfov).tan())
+        });
+        at.fold(0.0, f32::max)
+    }
+
+    /// A box from −1 to 1 without its side towards `open`, and a lamp in it that shines away from `up`.
+    fn room(open: Vec3, up: Vec3) -> Scene {
+        let mut walls = Mesh::default();
+        for axis in [Vec3::X, Vec3::Y, Vec3::Z].into_iter().flat_map(|axis| [axis, -axis]).filter(|&axis| axis != open)
+        {
+            let (a, b) = (axis.any_orthonormal_vector(), axis.cross(axis.any_orthonormal_vector()));
+            add_quad(&mut walls, [axis - a - b, axis + a - b, axis + a + b, axis - a + b]);
+        }
+        let (a, b, top) = (0.2 * open, 0.2 * open.cross(up), 0.95 * up);
+        let mut lamp = Mesh { material: 1, ..Mesh::default() };
+        add_quad(&mut lamp, [top - a - b, top + a - b, top + a + b, top - a + b]);
+        let [p, q, r] = lamp.triangles[0].map(|i| lamp.positions[i as usize]);
+        if (q - p).cross(r - p).dot(up) > 0.0 {
+            lamp.triangles.iter_mut().for_each(|triangle| triangle.swap(0, 1));
+        }
+        let materials = vec![Material::default(), Material::emitter("lamp", Vec3::ONE)];
+        Scene { meshes: vec![walls, lamp], materials, ..Scene::default() }
+    }
+
+    fn add_quad(mesh: &mut Mesh, corners: [Vec3; 4]) {
+        let n = mesh.positions.len() as u32;
+        mesh.positions.extend(corners);
+        mesh.triangles.extend([[n, n + 1, n + 2], [n, n + 2, n + 3]]);
+    }
+
+    /// From the scene's middle to the camera, unit, and the camera's up.
+    fn stands(camera: &Camera) -> [Vec3; 2] {
+        [camera.world_from_camera.translation.into(), camera.world_from_camera.matrix3.y_axis.into()]
+            .map(|v: Vec3| v.normalize())
+    }
+
+    #[test]
+    fn a_room_is_looked_at_through_its_open_side() {
+        for open in [Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::NEG_Z] {
+            let scene = room(open, Vec3::Y);
+            let camera = default_camera(&scene, &[]);
+            let [towards, up] = stands(&camera);
+            assert!(towards.dot(open) > 0.9 && up.y > 0.9, "{open}: {towards} {up}");
+            assert!(widest(&camera, &scene.meshes[0].positions) <= 1.0);
+        }
+        for open in [Vec3::X, Vec3::NEG_X, Vec3::NEG_Y] {
+            let [towards, up] = stands(&default_camera(&room(open, Vec3::Z), &[]));
+            assert!(towards.dot(open) > 0.9 && (open.x != 0.0 || up.z > 0.9), "{open}: {towards} {up}");
+        }
+        // From above, whichever way is up.
+        let [towards, up] = stands(&default_camera(&room(Vec3::Y, Vec3::Z), &[]));
+        assert!(towards.y > 0.8, "{towards} {up}");
+    }
+
+    #[test]
+    fn elsewhere_it_stands_where_it_always_does() {
+        let usual = stands(&default_camera(&Scene::default(), &[]));
+        let same = |scene: &Scene| {
+            let camera = default_camera(scene, &[]);
+            assert!(stands(&camera)[1].distance(usual[1]) < 1e-5, "{camera:?}");
+        };
+        // No light but the sky that is added; a sky of its own.
+        let mut scene = room(Vec3::NEG_Z, Vec3::Y);
+        scene.meshes.truncate(1);
+        same(&scene);
+        let mut scene = room(Vec3::NEG_Z, Vec3::Y);
+        scene.environment = Some(Environment::uniform(Vec3::ONE));
+        same(&scene);
+        // The sun stands behind the camera, or above it: the half of what is seen is enough.
+        let sun = |direction: Vec3| PunctualLight {
+            name: String::new(),
+            position: Vec3::ZERO,
+            direction: direction.normalize(),
+            intensity: Vec3::ONE,
+            kind: PunctualKind::Directional,
+        };
+        let mut scene = room(Vec3::NEG_Z, Vec3::Y);
+        scene.meshes.truncate(1);
+        scene.lights = vec![sun(Vec3::new(-0.5, -1.0, -0.5))];
+        same(&scene);
+        // Nowhere is more light to be seen.
+        let mut closed = room(Vec3::Z, Vec3::Y);
+        add_quad(
+            &mut closed.meshes[0],
+            [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| Vec3::new(x, y, 1.0)),
+        );
+        same(&closed);
+    }
+}
