@@ -20,7 +20,12 @@ use crate::scenes::Source;
 pub enum Device {
     Cpu(Accelerator),
     #[cfg(feature = "gpu")]
-    Gpu(Arc<Context>, Method),
+    Gpu {
+        context: Arc<Context>,
+        method: Method,
+        /// Of `--device`, if it was asked for by that.
+        named: Option<String>,
+    },
 }
 
 /// Limits the CPU's threads.
@@ -67,7 +72,8 @@ pub fn open_backend(name: &str) -> Result<Device> {
         "cpu" => Device::Cpu(Accelerator::Bvh),
         _ => {
             let method = if name == "gpu-hardware" { Method::Hardware } else { Method::Tree };
-            Device::Gpu(Arc::new(context_for(method, &Choice::Any)?), method)
+            let context = Arc::new(context_for(method, &Choice::Any)?);
+            Device::Gpu { context, method, named: None }
         }
     })
 }
@@ -111,7 +117,7 @@ fn open_gpu(args: &DeviceArgs, is_hardware: bool, progress: &Progress) -> Result
         None => return Ok(Device::Cpu(Accelerator::Bvh)),
     };
     match context_for(method, &choice) {
-        Ok(context) => Ok(Device::Gpu(Arc::new(context), method)),
+        Ok(context) => Ok(Device::Gpu { context: Arc::new(context), method, named: args.device.clone() }),
         // Nobody asked for a GPU, and there is something else.
         Err(error) if choice == Choice::Real && method == Method::Tree => {
             progress.say(&format!("sunfleck: warning: {error}; using the CPU"));
@@ -123,8 +129,8 @@ fn open_gpu(args: &DeviceArgs, is_hardware: bool, progress: &Progress) -> Result
 
 /// The same adapter, opened once more.
 #[cfg(feature = "gpu")]
-fn reopened(context: &Context, method: Method) -> Result<Device> {
-    Ok(Device::Gpu(Arc::new(context_for(method, &Choice::Index(context.info().index))?), method))
+fn reopened(context: &Context, method: Method) -> Result<Arc<Context>, sunfleck::ppm::Error> {
+    context_for(method, &Choice::Index(context.info().index)).map(Arc::new)
 }
 
 /// An adapter opened with what the method needs.
@@ -142,7 +148,17 @@ impl Device {
         match self {
             Self::Cpu(_) => "cpu",
             #[cfg(feature = "gpu")]
-            Self::Gpu(..) => "gpu",
+            Self::Gpu { .. } => "gpu",
+        }
+    }
+
+    /// The flags that choose it on a command line; how it searches is for the settings to say.
+    #[cfg(feature = "view")]
+    pub fn flags(&self) -> String {
+        match self {
+            #[cfg(feature = "gpu")]
+            Self::Gpu { named: Some(name), .. } => format!("--backend gpu --device {}", crate::render::quote(name)),
+            _ => format!("--backend {}", self.backend()),
         }
     }
 
@@ -151,7 +167,7 @@ impl Device {
         match self {
             Self::Cpu(_) => "tree".to_owned(),
             #[cfg(feature = "gpu")]
-            Self::Gpu(_, method) => method.to_string(),
+            Self::Gpu { method, .. } => method.to_string(),
         }
     }
 
@@ -160,7 +176,7 @@ impl Device {
         match self {
             Self::Cpu(accelerator) => *accelerator,
             #[cfg(feature = "gpu")]
-            Self::Gpu(..) => Accelerator::Bvh,
+            Self::Gpu { .. } => Accelerator::Bvh,
         }
     }
 
@@ -169,7 +185,7 @@ impl Device {
         match self {
             Self::Cpu(_) => false,
             #[cfg(feature = "gpu")]
-            Self::Gpu(context, _) => context.info().ray_queries,
+            Self::Gpu { context, .. } => context.info().ray_queries,
         }
     }
 
@@ -189,11 +205,12 @@ impl Device {
         match self {
             Self::Cpu(accelerator) => *accelerator = settings.accel.unwrap_or_default(),
             #[cfg(feature = "gpu")]
-            Self::Gpu(context, method) => {
+            Self::Gpu { context, method, .. } => {
                 let is_hardware = settings.index == Some(Index::Hardware) && context.info().ray_queries;
                 let wanted = if is_hardware { Method::Hardware } else { Method::Tree };
                 if *method != wanted {
-                    *self = reopened(context, wanted).context("index")?;
+                    *context = reopened(context, wanted).context("index")?;
+                    *method = wanted;
                 }
             }
         }
@@ -203,10 +220,10 @@ impl Device {
     /// Opens the adapter again, if this is one, and has failed for good.
     #[cfg(feature = "view")]
     pub fn recover(&mut self) -> Result<()> {
-        if let Self::Gpu(context, method) = self
+        if let Self::Gpu { context, method, .. } = self
             && context.check().is_err()
         {
-            *self = reopened(context, *method)?;
+            *context = reopened(context, *method)?;
         }
         Ok(())
     }
@@ -216,7 +233,7 @@ impl Device {
         match self {
             Self::Cpu(_) => None,
             #[cfg(feature = "gpu")]
-            Self::Gpu(context, _) => Some(context.info().to_string()),
+            Self::Gpu { context, .. } => Some(context.info().to_string()),
         }
     }
 
@@ -241,7 +258,7 @@ impl Device {
         Ok(match self {
             Self::Cpu(_) => Box::new(CpuStages::new(scene, camera, params.film_size())),
             #[cfg(feature = "gpu")]
-            Self::Gpu(context, method) => {
+            Self::Gpu { context, method, .. } => {
                 Box::new(GpuStages::with_method(Arc::clone(context), &scene, camera, *method)?)
             }
         })

@@ -47,7 +47,7 @@ impl Backends {
             match device {
                 Device::Cpu(_) => all.extend(cpu(points)),
                 #[cfg(feature = "gpu")]
-                Device::Gpu(context, method) => all.push(gpu::entrant(context, *method, points)?),
+                Device::Gpu { context, method, .. } => all.push(gpu::entrant(context, *method, points)?),
             }
         }
         Ok(all)

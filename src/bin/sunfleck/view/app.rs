@@ -31,8 +31,6 @@ pub struct First {
     pub choice: Option<Choice>,
     /// `key=value`, over the settings of every scene.
     pub always: Vec<String>,
-    /// The GPU that was asked for.
-    pub device: Option<String>,
     pub limits: Limits,
     /// Where saving goes without asking.
     pub output: Option<PathBuf>,
@@ -58,8 +56,7 @@ impl First {
             Source::resolve(&choice.name)?.set(&choice.set)?;
         }
         let limits = Limits { iterations: args.iterations, seconds: args.seconds, noise: args.noise };
-        let (device, output, reference) = (args.device.device.clone(), args.output.clone(), args.reference.clone());
-        Ok(Self { choice, always, device, limits, output, reference })
+        Ok(Self { choice, always, limits, output: args.output.clone(), reference: args.reference.clone() })
     }
 }
 
@@ -82,7 +79,6 @@ pub struct Viewer {
     /// Where saving goes without asking, and where the picture of which scene was saved last.
     pub output: Option<PathBuf>,
     pub saved_as: Option<(Option<Arc<Choice>>, PathBuf)>,
-    device_flags: String,
     pub convergence: super::convergence::Convergence,
     pub timing: super::timing::Timing,
     /// What was open before.
@@ -108,8 +104,6 @@ pub struct Viewer {
 impl Viewer {
     pub fn new(engine: Engine, wake: Wake, first: First) -> Self {
         let now = engine.now();
-        let device = first.device.map(|device| format!(" --device {}", crate::render::quote(&device)));
-        let device_flags = format!("--backend {}{}", engine.backend(), device.unwrap_or_default());
         let wanted = Wanted { scene: first.choice.map(Arc::new), limits: first.limits, ..Wanted::default() };
         Self {
             engine,
@@ -123,7 +117,6 @@ impl Viewer {
             compare: Default::default(),
             output: first.output,
             saved_as: None,
-            device_flags,
             convergence: Default::default(),
             timing: Default::default(),
             previous: None,
@@ -283,7 +276,7 @@ impl Viewer {
     pub fn command(&self) -> Option<String> {
         let opened = self.editing.as_ref()?;
         let iterations = self.now.frame.as_ref().map_or(1, |frame| frame.film.n_iterations);
-        Some(opened.command(self.edits.now(), &self.device_flags, iterations, Path::new("picture.exr")))
+        Some(opened.command(self.edits.now(), self.engine.device_flags(), iterations, Path::new("picture.exr")))
     }
 
     /// What is open.
@@ -304,7 +297,7 @@ impl Viewer {
     /// The picture as it looks now, to be written to `path`.
     pub fn saving_to(&self, path: PathBuf) -> Save {
         let (look, scene) = (self.wanted.painting.look, self.wanted.scene.clone());
-        Save { path, look, scene, device_flags: self.device_flags.clone() }
+        Save { path, look, scene }
     }
 
     /// Where saving goes without asking.

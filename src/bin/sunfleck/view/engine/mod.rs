@@ -266,6 +266,7 @@ pub struct Engine {
     shared: Arc<Shared>,
     backend: &'static str,
     has_ray_queries: bool,
+    device_flags: String,
     threads: Vec<JoinHandle<()>>,
 }
 
@@ -280,7 +281,7 @@ impl Engine {
             #[cfg(test)]
             asks: Arc::default(),
         });
-        let (backend, has_ray_queries) = (device.backend(), device.has_ray_queries());
+        let (backend, has_ray_queries, device_flags) = (device.backend(), device.has_ray_queries(), device.flags());
         let named = |name: &str| std::thread::Builder::new().name(name.to_owned());
         let [render, paint, write] = std::array::from_fn(|_| Arc::clone(&shared));
         let threads = vec![
@@ -288,7 +289,7 @@ impl Engine {
             named("paint").spawn(move || painting::run(&paint))?,
             named("write").spawn(move || saving::run(&write))?,
         ];
-        Ok(Self { shared, backend, has_ray_queries, threads })
+        Ok(Self { shared, backend, has_ray_queries, device_flags, threads })
     }
 
     /// `cpu` or `gpu`.
@@ -299,6 +300,11 @@ impl Engine {
     /// Whether the device can find photons by ray queries.
     pub fn has_ray_queries(&self) -> bool {
         self.has_ray_queries
+    }
+
+    /// What chooses the device on the command line.
+    pub fn device_flags(&self) -> &str {
+        &self.device_flags
     }
 
     /// Says what is wanted from now on.
@@ -319,11 +325,8 @@ impl Engine {
 
     /// Writes what there is, and comes back when that is done: for the end.
     pub fn save_and_wait(&self, save: &Save) -> Result<()> {
-        let newest = {
-            let board = self.shared.board();
-            board.frame.as_ref().map(|frame| saving::Newest::of(frame, &board.device))
-        };
-        newest.context("there is no picture yet")?.write(save).map(|_| ())
+        let frame = self.shared.board().frame.clone();
+        save.write(frame.as_deref().context("there is no picture yet")?).map(|_| ())
     }
 
     /// Larger pictures are shown reduced, pixels a side.

@@ -21,50 +21,35 @@ pub struct Save {
     pub look: Look,
     /// Whose picture it is.
     pub scene: Option<Arc<Choice>>,
-    /// The command line's flags for the device.
-    pub device_flags: String,
-}
-
-/// The newest film that was read back, and what rendered it.
-pub struct Newest {
-    frame: Arc<Frame>,
-    device: String,
 }
 
 impl Save {
     /// What is to be written, or why nothing is; none as long as that is to be seen.
-    fn ready(&self, board: &Board) -> Option<Result<Newest, &'static str>> {
+    fn ready(&self, board: &Board) -> Option<Result<Arc<Frame>, &'static str>> {
         if self.scene != board.wanted.scene {
             return Some(Err("its scene was left before there was a picture of it"));
         }
         let frame = board.frame.as_ref().filter(|frame| Some(&frame.opened.choice) == self.scene.as_ref());
         let has_failed = matches!(board.phase, Phase::Failed(_));
         match frame.filter(|frame| !frame.is_preview || has_failed) {
-            Some(frame) => Some(Ok(Newest::of(frame, &board.device))),
+            Some(frame) => Some(Ok(Arc::clone(frame))),
             None if has_failed || board.quit || self.scene.is_none() => Some(Err("there is no picture yet")),
             None => None,
         }
     }
-}
 
-impl Newest {
-    pub fn of(frame: &Arc<Frame>, device: &str) -> Self {
-        Self { frame: Arc::clone(frame), device: device.to_owned() }
-    }
-
-    /// Returns the number of its iterations.
-    pub fn write(self, save: &Save) -> Result<u32> {
-        let Self { frame, device } = self;
-        let (film, params) = (&frame.film, &frame.params);
+    /// Writes a film. Returns the number of its iterations.
+    pub fn write(&self, frame: &Frame) -> Result<u32> {
+        let (film, params, machine) = (&frame.film, &frame.params, &frame.machine);
         let picture = frame.picture();
-        if job::is_png(&save.path) {
-            output::png::write(&save.path, &picture, &save.look)?;
+        if job::is_png(&self.path) {
+            output::png::write(&self.path, &picture, &self.look)?;
         } else {
             let header = output::exr::Header {
                 scene: frame.opened.source.name.clone(),
-                command: frame.opened.command(&frame.settings, &save.device_flags, film.n_iterations, &save.path),
-                adapter: device,
-                index: frame.index.clone(),
+                command: frame.opened.command(&frame.settings, &machine.flags, film.n_iterations, &self.path),
+                adapter: machine.device.clone(),
+                index: machine.index.clone(),
                 accelerator: frame.scene.accelerator().to_string(),
                 seed: params.seed,
                 alpha: params.alpha,
@@ -75,7 +60,7 @@ impl Newest {
                 seconds: frame.seconds,
                 camera: frame.camera,
             };
-            output::exr::write(&save.path, &picture, &header)?;
+            output::exr::write(&self.path, &picture, &header)?;
         }
         Ok(film.n_iterations)
     }
@@ -88,14 +73,14 @@ pub fn run(shared: &Shared) {
         saves.find_map(|(i, save)| Some((i, save.ready(board)?)))
     };
     loop {
-        let (save, newest) = {
+        let (save, frame) = {
             let mut board = shared.wait_until(|board| next(board).is_some());
-            let Some((i, newest)) = next(&board) else { break };
-            (board.saves.remove(i), newest)
+            let Some((i, frame)) = next(&board) else { break };
+            (board.saves.remove(i), frame)
         };
         let path = save.path.display();
-        let done = match newest {
-            Ok(newest) => catch(|| newest.write(&save).map_err(|error| crate::one_line(&crate::chain(&error)))),
+        let done = match frame {
+            Ok(frame) => catch(|| save.write(&frame).map_err(|error| crate::one_line(&crate::chain(&error)))),
             Err(why) => Ok(Err(format!("{path} was not written: {why}"))),
         };
         let message = match done.flatten() {

@@ -38,8 +38,7 @@ pub struct Frame {
     /// What it is an estimate of.
     pub opened: Arc<Opened>,
     pub settings: Arc<Settings>,
-    /// What found photons: `tree` or `hardware`.
-    pub index: String,
+    pub machine: Arc<Machine>,
     /// `[h·w]`, metres.
     pub first_radii: Arc<Vec<f32>>,
     /// Read back only where something shown needs it.
@@ -49,6 +48,17 @@ pub struct Frame {
     pub radius: f32,
     /// Since the restart, pauses left out.
     pub seconds: f64,
+}
+
+/// What renders.
+#[derive(Clone, Debug)]
+pub struct Machine {
+    /// For people.
+    pub device: String,
+    /// What chooses it on the command line.
+    pub flags: String,
+    /// What finds photons: `tree` or `hardware`.
+    pub index: String,
 }
 
 impl Frame {
@@ -77,7 +87,7 @@ pub struct Session {
     /// What `input` was made with.
     pub settings: Arc<Settings>,
     scene: Arc<PackedScene>,
-    index: String,
+    pub machine: Arc<Machine>,
     stages: Box<dyn Stages>,
     estimate: u64,
     params: Params,
@@ -108,12 +118,13 @@ impl Session {
         let mut stages = device.stages_of(Arc::clone(&scene), &input)?;
         stages.set_interrupt(interrupt);
         let params = input.params.clone();
+        let machine = Machine { device: stages.device(), flags: device.flags(), index: device.index() };
         Ok(Self {
             opened,
             input,
             settings,
             scene,
-            index: device.index(),
+            machine: Arc::new(machine),
             stages,
             estimate: 0,
             params,
@@ -229,7 +240,7 @@ impl Session {
             scene: Arc::clone(&self.scene),
             opened: Arc::clone(&self.opened),
             settings: Arc::clone(&self.settings),
-            index: self.index.clone(),
+            machine: Arc::clone(&self.machine),
             first_radii: self.radii.clone().unwrap_or_default(),
             insides: None,
             first_radius: self.first_radius,
@@ -256,9 +267,5 @@ impl Session {
             && (limits.iterations.is_some_and(|n| self.n_iterations >= n)
                 || limits.seconds.is_some_and(|s| self.seconds >= s)
                 || limits.noise.zip(noise).is_some_and(|(limit, noise)| noise <= limit))
-    }
-
-    pub fn device(&self) -> String {
-        self.stages.device()
     }
 }

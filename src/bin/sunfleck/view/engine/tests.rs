@@ -103,8 +103,8 @@ impl Bench {
 
     fn save(&self, path: &Path) -> Message {
         self.engine.take_messages();
-        let (scene, device_flags) = (self.wanted.scene.clone(), "--backend cpu".to_owned());
-        self.engine.save(Save { path: path.to_owned(), look: Look::default(), scene, device_flags });
+        let scene = self.wanted.scene.clone();
+        self.engine.save(Save { path: path.to_owned(), look: Look::default(), scene });
         let mut said = vec![];
         self.wait("saving", |_| {
             said.extend(self.engine.take_messages());
@@ -197,7 +197,7 @@ fn a_picture_is_saved_while_the_render_thread_is_busy() {
     let left = bench.wanted.scene.clone();
     let other = folder.path().join("b.exr");
     bench.choose("glass", &["size=8x8", "photons=10"]);
-    let late = Save { path: other.clone(), look: Look::default(), scene: left, device_flags: String::new() };
+    let late = Save { path: other.clone(), look: Look::default(), scene: left };
     bench.engine.save(late);
     let said = |message: &Message, part| matches!(message, Message::Error(text) if text.contains(part));
     bench.wait("refusal", |_| bench.engine.take_messages().iter().any(|m| said(m, "b.exr was not written")));
@@ -216,8 +216,8 @@ fn a_preview_is_not_saved_for_the_picture() {
     bench.wait_for_film(&Phase::Reached, 2);
     bench.send();
     bench.wait("a preview", |now| now.frame.as_ref().is_some_and(|frame| frame.is_preview));
-    let (scene, device_flags) = (bench.wanted.scene.clone(), String::new());
-    bench.engine.save(Save { path: path.clone(), look: Look::default(), scene, device_flags });
+    let scene = bench.wanted.scene.clone();
+    bench.engine.save(Save { path: path.clone(), look: Look::default(), scene });
     bench.wanted.moving = false;
     bench.send();
     bench.wait("saving", |_| path.exists());
@@ -382,7 +382,7 @@ fn a_lost_device_is_opened_again() {
             return;
         }
     };
-    let Device::Gpu(context, _) = &device else { unreachable!("asked for a GPU") };
+    let Device::Gpu { context, .. } = &device else { unreachable!("asked for a GPU") };
     let context = Arc::clone(context);
     let mut bench = Bench::open_on(device, "cornell", until(2));
     let before = bench.wait_for_film(&Phase::Reached, 2);

@@ -159,7 +159,7 @@ impl Have {
                 let session = Session::new(device, opened, settings, input, before.as_deref(), interrupt)?;
                 shared.update(|board| {
                     board.messages.extend(warnings);
-                    board.device = session.device();
+                    board.device.clone_from(&session.machine.device);
                 });
                 self.session = Some(session);
             }

@@ -165,7 +165,7 @@ fn loses_its_device() {
     };
     let bell = Bell::default();
     let device = crate::devices::open_backend("gpu").unwrap();
-    let Device::Gpu(renderer, _) = &device else { unreachable!("asked for a GPU") };
+    let Device::Gpu { context: renderer, .. } = &device else { unreachable!("asked for a GPU") };
     let renderer = Arc::clone(renderer);
     let engine = Engine::start(device, bell.wake()).unwrap();
     let set = ["size=32x24", "photons=500"].map(str::to_owned).to_vec();
