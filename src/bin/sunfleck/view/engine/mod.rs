@@ -7,6 +7,7 @@
 mod history;
 mod paint;
 mod painting;
+mod reading;
 mod saving;
 mod session;
 #[cfg(test)]
@@ -175,6 +176,17 @@ struct Shared {
 }
 
 impl Shared {
+    fn new(wake: Wake) -> Arc<Self> {
+        Arc::new(Self {
+            board: Mutex::default(),
+            changed: Condvar::new(),
+            wake,
+            is_unwanted: Arc::default(),
+            #[cfg(test)]
+            asks: Arc::default(),
+        })
+    }
+
     fn board(&self) -> MutexGuard<'_, Board> {
         // Nothing that holds the lock can leave it half changed.
         self.board.lock().unwrap_or_else(PoisonError::into_inner)
@@ -273,14 +285,7 @@ pub struct Engine {
 impl Engine {
     /// Starts the threads; `wake` is called from them.
     pub fn start(device: Device, wake: Wake) -> std::io::Result<Self> {
-        let shared = Arc::new(Shared {
-            board: Mutex::default(),
-            changed: Condvar::new(),
-            wake,
-            is_unwanted: Arc::default(),
-            #[cfg(test)]
-            asks: Arc::default(),
-        });
+        let shared = Shared::new(wake);
         let (backend, has_ray_queries, device_flags) = (device.backend(), device.has_ray_queries(), device.flags());
         let named = |name: &str| std::thread::Builder::new().name(name.to_owned());
         let [render, paint, write] = std::array::from_fn(|_| Arc::clone(&shared));
@@ -385,7 +390,7 @@ impl Engine {
 }
 
 impl Drop for Engine {
-    /// Waits for a painting under way, and for files that are being written.
+    /// Waits for a painting under way, and for files that are being written; not for a scene that is being read.
     fn drop(&mut self) {
         self.shared.redirect(|board| board.quit = true);
         for thread in self.threads.drain(..) {

@@ -3,21 +3,21 @@
 use std::sync::Arc;
 
 use anyhow::Result;
-use glam::Vec3;
 use sunfleck::ppm::Error;
 use sunfleck::scene::Accelerator;
 use sunfleck::scene::settings::{Index, Settings};
 
+use super::reading::{self, Reader};
 use super::session::Session;
-use super::{Board, Choice, Message, Opened, Phase, Shared, Wanted, catch, is_same};
+use super::{Board, Message, Opened, Phase, Shared, Wanted, catch, is_same};
 use crate::cli::InputArgs;
 use crate::devices::Device;
 use crate::job;
-use crate::scenes::Source;
 
 /// What the render thread has of what is wanted.
 struct Have {
     wanted: Wanted,
+    reader: Reader,
     session: Option<Session>,
     opened: Option<Arc<Opened>>,
     estimate: u64,
@@ -41,7 +41,14 @@ impl Work {
 
 /// Until the interface is gone.
 pub fn run(shared: &Arc<Shared>, mut device: Device) {
-    let mut have = Have { wanted: Wanted::default(), session: None, opened: None, estimate: 0, steps_done: 0 };
+    let mut have = Have {
+        wanted: Wanted::default(),
+        reader: Reader::default(),
+        session: None,
+        opened: None,
+        estimate: 0,
+        steps_done: 0,
+    };
     loop {
         let wanted = {
             let board = shared.wait_until(|board| {
@@ -99,23 +106,27 @@ impl Have {
     }
 
     /// Does one thing that leads towards what is wanted.
-    fn follow(&mut self, shared: &Shared, device: &mut Device, wanted: &Wanted) -> Result<()> {
+    fn follow(&mut self, shared: &Arc<Shared>, device: &mut Device, wanted: &Wanted) -> Result<()> {
         let is_retry = self.wanted.retries != wanted.retries && self.session.is_none() && wanted.scene.is_some();
-        let is_other_scene = is_other_scene(&self.wanted, wanted) || is_retry && self.opened.is_none();
+        let reads = is_other_scene(&self.wanted, wanted) || is_retry && self.opened.is_none();
         let is_stale = self.is_stale(wanted);
         let before = std::mem::replace(&mut self.wanted, wanted.clone());
         if is_retry {
             device.recover()?;
         }
-        if is_other_scene {
+        if reads {
             // The memory of the old one first.
             (self.session, self.opened) = (None, None);
             shared.update(|board| {
                 (board.opened, board.frame, board.painted) = (None, None, None);
                 board.phase = if wanted.scene.is_some() { Phase::Loading } else { Phase::Empty };
             });
-            let Some(choice) = &wanted.scene else { return Ok(()) };
-            let opened = Arc::new(open(choice)?);
+            let Some(choice) = wanted.scene.clone() else { return Ok(()) };
+            let is_left = |board: &Board| is_other_scene(wanted, &board.wanted);
+            let Some(opened) = self.reader.read(shared, move || reading::open(&choice), is_left)? else {
+                return Ok(());
+            };
+            let opened = Arc::new(opened);
             self.opened = Some(Arc::clone(&opened));
             shared.update(|board| {
                 board.messages.extend(device.cannot(&opened.source).into_iter().map(Message::Warning));
@@ -232,17 +243,6 @@ impl Have {
 /// The phase of an estimate that does not go on.
 fn resting(wanted: &Wanted) -> Phase {
     if wanted.paused { Phase::Paused } else { Phase::Reached }
-}
-
-/// Reads a scene and the settings that lie beside it.
-fn open(choice: &Arc<Choice>) -> Result<Opened> {
-    let mut source = Source::resolve(&choice.name)?;
-    let read = source.settings.clone();
-    source.set(&choice.set)?;
-    let mut loaded = source.scene()?;
-    source.settings.add_default_camera(&mut loaded.scene);
-    let bounds = loaded.scene.bounds(&source.settings.spheres()).unwrap_or([-0.5, 0.5].map(Vec3::splat));
-    Ok(Opened { choice: Arc::clone(choice), source, read, loaded, bounds })
 }
 
 fn is_other_scene(before: &Wanted, now: &Wanted) -> bool {
