@@ -249,7 +249,8 @@ fn move_camera(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, response: &egui::
         if is_pan {
             act(viewer, &mut |rig| rig.pan(glam::vec2(drag.x, drag.y)));
         } else if response.dragged_by(PointerButton::Primary) {
-            act(viewer, &mut |rig| rig.orbit(-ORBIT * drag.x, ORBIT * drag.y));
+            // What is in front of the pivot follows the cursor.
+            act(viewer, &mut |rig| rig.orbit(ORBIT * drag.x, -ORBIT * drag.y));
         } else if response.dragged_by(PointerButton::Secondary) {
             act(viewer, &mut |rig| rig.look(LOOK * drag.x, -LOOK * drag.y));
         }

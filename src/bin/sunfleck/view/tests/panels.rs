@@ -163,11 +163,13 @@ fn help_has_every_shortcut() {
 fn a_drag_turns_the_camera_and_can_be_undone() {
     let mut window = bare();
     let settings = window.viewer().edits.now().clone();
-    for (button, modifiers) in [
-        (PointerButton::Primary, Modifiers::NONE),
-        (PointerButton::Primary, Modifiers::SHIFT),
-        (PointerButton::Middle, Modifiers::NONE),
-        (PointerButton::Secondary, Modifiers::NONE),
+    let before = window.viewer().camera().unwrap().world_from_camera;
+    // To the right and down: the scene comes along, or the camera turns that way.
+    for (button, modifiers, stands) in [
+        (PointerButton::Primary, Modifiers::NONE, false),
+        (PointerButton::Primary, Modifiers::SHIFT, false),
+        (PointerButton::Middle, Modifiers::NONE, false),
+        (PointerButton::Secondary, Modifiers::NONE, true),
     ] {
         let middle = window.harness.get_by_role_and_label(Role::Image, "Picture").rect().center();
         let events = &mut window.harness.input_mut().events;
@@ -185,7 +187,9 @@ fn a_drag_turns_the_camera_and_can_be_undone() {
         let events = &mut window.harness.input_mut().events;
         events.extend([press(to, false), Event::ModifiersChanged(Modifiers::NONE)]);
         window.step();
-        assert!(window.viewer().edits.now().camera.is_some(), "{button:?} {modifiers:?}");
+        let now = before.inverse() * window.viewer().camera().unwrap().world_from_camera;
+        let moved = if stands { -now.matrix3.z_axis } else { -now.translation };
+        assert!(moved.x > 1e-3 && moved.y < -1e-3, "{button:?} {modifiers:?}: {now}");
         window.steps(30);
         window.wait_for_picture();
         window.press(Modifiers::COMMAND, Key::Z);
