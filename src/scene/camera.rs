@@ -40,6 +40,18 @@ impl Camera {
         }
     }
 
+    /// The axis that is up to it: y, or z for one that is level with z and not with y, or that looks straight along y with z
+    /// above. One that looks straight down on a map, −z above, has y.
+    pub fn up_axis(&self) -> Vec3 {
+        /// Sine of the angle from which on an axis is tilted.
+        const TILTED: f32 = 1e-3;
+        let m = &self.world_from_camera.matrix3;
+        let is_level = |axis: Vec3| Vec3::from(m.x_axis).dot(axis).abs() <= TILTED;
+        let looks_along_y = m.y_axis.y.abs() <= TILTED && m.y_axis.z > 0.0;
+        let is_z_up = is_level(Vec3::Z) && (looks_along_y || !is_level(Vec3::Y));
+        if is_z_up { Vec3::Z } else { Vec3::Y }
+    }
+
     /// World from camera at `position`, metres, looking along `forward` with `up` above, both of any length.
     pub fn stand(position: Vec3, forward: Vec3, up: Vec3) -> Affine3A {
         let back = (-forward).normalize_or(Vec3::Z);

@@ -102,6 +102,8 @@ pub fn prepare(source: &Source, settings: &Settings, mut loaded: Loaded, args: &
     let mut settings = settings.clone();
     settings.environment = settings.environment.filter(|_| args.env.is_none());
     settings.camera = settings.camera.filter(|_| args.camera.is_none());
+    // Wherever the light comes from then.
+    settings.add_default_camera(&mut loaded.scene);
     if let Some(path) = &args.env {
         let (environment, warnings) = load_environment(path)?;
         loaded.scene.environment = Some(environment);
@@ -364,6 +366,13 @@ mod tests {
         let args = InputArgs::default();
         let mut input = prepare(&source, &settings, read.clone(), &args).unwrap();
         assert_eq!(input.camera.pack(4, 3), cameras[0].pack(4, 3));
+        let folder = tempfile::tempdir().unwrap();
+        let sky = folder.path().join("sky.hdr");
+        let pixels = image::ImageBuffer::from_pixel(2, 1, image::Rgb([1.0f32; 3]));
+        image::DynamicImage::ImageRgb32F(pixels).save(&sky).unwrap();
+        let lit = InputArgs { env: Some(sky), ..InputArgs::default() };
+        let lit = prepare(&source, &settings, read.clone(), &lit).unwrap();
+        assert_eq!(lit.camera.pack(4, 3), cameras[0].pack(4, 3));
         let without = prepare(&source, &Settings::default(), read.clone(), &args).unwrap();
         assert_ne!(without.camera.pack(4, 3), cameras[0].pack(4, 3));
         settings.light_scale = Some(0.0);

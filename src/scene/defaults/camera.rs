@@ -14,13 +14,19 @@ const FILLED: f32 = 0.93 * 0.5 * YFOV;
 const USUAL: [f32; 2] = [30.0, 20.0];
 /// A view is taken instead of one before it if this much more of it faces a lamp.
 const CLEARLY_MORE: f32 = 1.25;
+/// And that is no speck.
+const LEAST_SHARE: f32 = 0.05;
+/// Lamps that lie so much farther towards z than towards y, in radii of the scene, hang from a ceiling: z is up.
+const LEAN: f32 = 0.25;
+/// Views that are tried at the same time.
+const VIEWS_AT_ONCE: usize = 5;
 
 /// A camera that has the whole scene in view, and the spheres `more`, in pictures at least as wide as high, and as near as
 /// that lets it: a little from the right, a little from above. Rooms made of one inward sphere do not count as long as
 /// there is something else.
 ///
-/// Where clearly more of what is seen faces a lamp from another side, as before a room of which a wall is left out,
-/// it stands there; also if z is up in that room.
+/// Where clearly more of what is seen faces a lamp from another side, as before a room of which a wall is left out, it stands
+/// there; so that z is up if the lamps of that room say so.
 pub fn default_camera(scene: &Scene, more: &[Sphere]) -> Camera {
     let outside = bounding_sphere(scene, more, false);
     let with_inward = outside.is_none();
@@ -32,22 +38,28 @@ pub fn default_camera(scene: &Scene, more: &[Sphere]) -> Camera {
     };
     let usual = framed(View::y_up(USUAL));
     let Some(lamps) = Lamps::of(scene) else { return usual };
-    let usual_share = lamps.share_of_view(scene, &usual);
-    if CLEARLY_MORE * usual_share >= 1.0 {
-        return usual;
+    let [n_lit, n_usual] = lamps.lit_and_seen(scene, &usual);
+    let share = |[n_lit, n_seen]: [usize; 2]| n_lit as f32 / n_seen.max(n_usual).max(1) as f32;
+    let mut best = (share([n_lit, n_usual]), usual);
+    let is_z_up = lamps.lean(centre, radius) > LEAN * radius;
+    for views in View::others(is_z_up).chunks(VIEWS_AT_ONCE) {
+        // No other can be clearly better.
+        if CLEARLY_MORE * best.0 >= 1.0 {
+            break;
+        }
+        let others: Vec<_> = views
+            .par_iter()
+            .map(|&view| {
+                let camera = framed(view);
+                (share(lamps.lit_and_seen(scene, &camera)), camera)
+            })
+            .collect();
+        best = others.into_iter().fold(best, |best, other| match other.0 > (CLEARLY_MORE * best.0).max(LEAST_SHARE) {
+            true => other,
+            false => best,
+        });
     }
-    let others: Vec<_> = View::others()
-        .into_par_iter()
-        .map(|view| {
-            let camera = framed(view);
-            (lamps.share_of_view(scene, &camera), camera)
-        })
-        .collect();
-    let better = |best: (f32, Camera), other: (f32, Camera)| match other.0 > CLEARLY_MORE * best.0 {
-        true => other,
-        false => best,
-    };
-    others.into_iter().fold((usual_share, usual), better).1
+    best.1
 }
 
 /// A direction to look from.
@@ -72,11 +84,12 @@ impl View {
         Self { towards: Vec3::new(sin, -cos, 0.0), up: Vec3::Z }
     }
 
-    /// Better ones for most scenes first.
-    fn others() -> Vec<Self> {
+    /// The likelier ones first.
+    fn others(is_z_up: bool) -> Vec<Self> {
         let sides = [0.0, 30.0, 90.0, 180.0, 270.0];
         let y_up = [20.0, 0.0, 60.0].into_iter().flat_map(|elevation| sides.map(|side| Self::y_up([side, elevation])));
-        y_up.chain(sides.map(Self::z_up)).collect()
+        let (y_up, z_up) = (y_up.collect(), sides.map(Self::z_up).to_vec());
+        if is_z_up { [z_up, y_up].concat() } else { [y_up, z_up].concat() }
     }
 
     /// The camera of this view that shows all points, relative to `centre`, with their radii; they lie within `radius` of
@@ -211,13 +224,23 @@ mod tests {
             assert!(towards.dot(open) > 0.9 && up.y > 0.9, "{open}: {towards} {up}");
             assert!(widest(&camera, &scene.meshes[0].positions) <= 1.0);
         }
-        for open in [Vec3::X, Vec3::NEG_X, Vec3::NEG_Y] {
+        for open in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y] {
             let [towards, up] = stands(&default_camera(&room(open, Vec3::Z), &[]));
-            assert!(towards.dot(open) > 0.9 && (open.x != 0.0 || up.z > 0.9), "{open}: {towards} {up}");
+            assert!(towards.dot(open) > 0.9 && up.z > 0.9, "{open}: {towards} {up}");
         }
-        // From above, whichever way is up.
-        let [towards, up] = stands(&default_camera(&room(Vec3::Y, Vec3::Z), &[]));
-        assert!(towards.y > 0.8, "{towards} {up}");
+    }
+
+    /// Not from where a wall is a line that is all lit.
+    #[test]
+    fn a_wall_is_looked_at_from_its_lit_side() {
+        let mut scene = room(Vec3::Z, Vec3::Y);
+        scene.meshes[0] = Mesh::default();
+        add_quad(
+            &mut scene.meshes[0],
+            [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| Vec3::new(x, y, 1.0)),
+        );
+        let [towards, up] = stands(&default_camera(&scene, &[]));
+        assert!(towards.z < -0.8 && up.y > 0.9, "{towards} {up}");
     }
 
     #[test]
@@ -246,12 +269,15 @@ mod tests {
         scene.meshes.truncate(1);
         scene.lights = vec![sun(Vec3::new(-0.5, -1.0, -0.5))];
         same(&scene);
-        // Nowhere is more light to be seen.
+        // Nowhere is more light to be seen, or but a speck.
         let mut closed = room(Vec3::Z, Vec3::Y);
         add_quad(
             &mut closed.meshes[0],
             [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| Vec3::new(x, y, 1.0)),
         );
+        same(&closed);
+        let knob = [[-0.02, -0.02], [0.02, -0.02], [0.02, 0.02], [-0.02, 0.02]].map(|[x, y]| Vec3::new(-x, y, -1.01));
+        add_quad(&mut closed.meshes[1], knob);
         same(&closed);
     }
 }

@@ -60,13 +60,22 @@ impl Lamps {
         (!lamps.is_empty()).then_some(Self(lamps))
     }
 
-    /// The share of the triangles in view, by area in the picture, that shines, lets light through or faces a lamp; 0 if
-    /// there are none. All must be in front of the camera, which has perspective.
-    pub fn share_of_view(&self, scene: &Scene, camera: &Camera) -> f32 {
+    /// Of the pixels of a picture with triangles in them, how many show what shines, lets light through or faces a lamp; and
+    /// how many there are. All must be in front of the camera, which has perspective.
+    pub fn lit_and_seen(&self, scene: &Scene, camera: &Camera) -> [usize; 2] {
         let seen = seen(scene, camera);
         let eye = Vec3::from(camera.world_from_camera.translation);
-        let n_lit = seen.iter().filter(|seen| self.light(seen, eye)).count();
-        n_lit as f32 / seen.len().max(1) as f32
+        [seen.iter().filter(|seen| self.light(seen, eye)).count(), seen.len()]
+    }
+
+    /// How much farther towards z than towards y the lamps of a scene of this place and size lie, on average, metres.
+    pub fn lean(&self, centre: Vec3, radius: f32) -> f32 {
+        let offsets = self.0.iter().map(|lamp| match *lamp {
+            Lamp::Point(position) | Lamp::OneSided(position, _) => position - centre,
+            Lamp::Directional(direction) => -direction * radius,
+        });
+        let sum: Vec3 = offsets.sum();
+        (sum.z - sum.y) / self.0.len() as f32
     }
 
     fn light(&self, seen: &Seen, eye: Vec3) -> bool {
@@ -99,7 +108,7 @@ fn seen<'a>(scene: &'a Scene, camera: &Camera) -> Vec<Seen<'a>> {
         for &triangle in &mesh.triangles {
             let Some([a, b, c]) = corners(&mesh.positions, triangle) else { continue };
             let normal = (b - a).cross(c - a);
-            if !material.double_sided && normal.dot(eye - a) <= 0.0 {
+            if !material.double_sided && material.transmission == 0.0 && normal.dot(eye - a) <= 0.0 {
                 continue;
             }
             let places = [a, b, c].map(|p| {

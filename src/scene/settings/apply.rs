@@ -108,7 +108,8 @@ impl Settings {
         checks.0
     }
 
-    /// Changes and adds to a scene, in this order, as the settings say; the first camera is then the one to use.
+    /// Changes and adds to a scene, in this order, as the settings say; the first camera is then the one to use. A scene
+    /// without a camera gets the default one ([`Settings::add_default_camera`]).
     ///
     /// `folder` is where the settings file lies. Returns warnings.
     pub fn apply_to_scene(&self, scene: &mut Scene, folder: &Path) -> Result<Vec<String>, SettingsError> {
@@ -166,12 +167,12 @@ impl Settings {
     /// has their spheres in view, and depends on nothing else in them: it stays where it is while they are edited.
     pub fn add_default_camera(&self, scene: &mut Scene) {
         if scene.cameras.is_empty() {
-            scene.cameras.push(default_camera(scene, &self.spheres()));
+            scene.cameras.push(default_camera(scene, &self.added_spheres()));
         }
     }
 
     /// Where spheres are added; all of material 0.
-    pub fn spheres(&self) -> Vec<Sphere> {
+    pub fn added_spheres(&self) -> Vec<Sphere> {
         let sphere =
             |s: &SphereSettings| Sphere { centre: s.centre.into(), radius: s.radius, inward: s.inward, material: 0 };
         self.spheres.iter().map(sphere).collect()
@@ -232,7 +233,7 @@ impl CameraSettings {
                 (None, None) => -Vec3::from(camera.world_from_camera.matrix3.z_axis),
             };
             let forward = forward.try_normalize().ok_or(("camera.look_at".into(), "is where the camera is".into()))?;
-            let up = self.up.map_or(Vec3::Y, Vec3::from).normalize_or(Vec3::Y);
+            let up = self.up.map_or(camera.up_axis(), Vec3::from).normalize_or(Vec3::Y);
             if let Some(target) = self.look_at {
                 camera.focus_distance = position.distance(target.into());
             }

@@ -51,12 +51,27 @@ impl Rig {
     pub fn new(camera: &Camera, bounds: [Vec3; 2]) -> Self {
         let mut rig = Self { camera: camera.clone(), pivot: Vec3::ZERO, up: Vec3::Y, size: size(bounds) };
         let [right, above, forward] = rig.frame();
-        rig.up = up(right, above);
+        let axis = camera.up_axis();
+        rig.up = if right.dot(axis).abs() > TILTED { above } else { along(axis, above) };
         let depth = (0.5 * (bounds[0] + bounds[1]) - rig.position()).dot(forward);
         let in_front = depth.is_finite() && depth > 0.01 * rig.size;
         let depth = if in_front { depth } else { camera.focus_distance };
         rig.pivot = rig.position() + forward * depth.max(rig.nearest());
         rig
+    }
+
+    /// About another axis, which is that of cameras before or beside this one, if the camera is level with it.
+    pub fn turning_about(mut self, axis: Vec3) -> Self {
+        let [right, above, _] = self.frame();
+        if right.dot(axis).abs() <= TILTED && above.dot(axis).abs() > TILTED {
+            self.up = along(axis, above);
+        }
+        self
+    }
+
+    /// What orbiting turns round, unit.
+    pub fn up(&self) -> Vec3 {
+        self.up
     }
 
     /// Takes over a camera with another lens that stands as this one; says whether it does. Pivot and up axis stay.
@@ -288,18 +303,9 @@ impl Rig {
     }
 }
 
-/// What a camera turns about: the axis y or z that it is level with, or its own up. One that looks straight along y is
-/// held to look down on a map, north above, or to stand in a scene in which z is up.
-fn up(right: Vec3, above: Vec3) -> Vec3 {
-    let is_level = |axis: Vec3| right.dot(axis).abs() <= TILTED;
-    let along = |axis: Vec3| axis * if above.dot(axis) < -TILTED { -1.0 } else { 1.0 };
-    let is_z_up = above.y.abs() <= TILTED && above.z > 0.0;
-    match (is_level(Vec3::Y), is_level(Vec3::Z)) {
-        (true, true) if is_z_up => along(Vec3::Z),
-        (true, _) => along(Vec3::Y),
-        (false, true) => along(Vec3::Z),
-        (false, false) => above,
-    }
+/// The axis, turned so that it is not below.
+fn along(axis: Vec3, above: Vec3) -> Vec3 {
+    axis * if above.dot(axis) < -TILTED { -1.0 } else { 1.0 }
 }
 
 fn within(p: Vec3) -> bool {
@@ -520,6 +526,20 @@ mod tests {
         }
         let tilted = up([1.0, 2.0, 3.0], Vec3::new(0.3, 1.0, 0.2));
         assert!(tilted.y > 0.5 && tilted.y < 0.999 && tilted.z.abs() > 0.01, "{tilted}");
+    }
+
+    /// As after undo, or of a file that was saved.
+    #[test]
+    fn the_axis_stays_where_the_camera_does_not_say_it() {
+        let camera = Camera::look_at("", Vec3::new(0.0, -5.0, 0.0), Vec3::ZERO, Vec3::Z, 0.7);
+        let mut rig = Rig::new(&camera, BOUNDS);
+        rig.orbit(0.0, -0.3);
+        let again = Rig::new(rig.camera(), BOUNDS);
+        assert_eq!(again.up(), Vec3::Y);
+        assert_eq!(again.turning_about(rig.up()).up(), Vec3::Z);
+        // One that says it is left alone.
+        let other = Camera::look_at("", Vec3::new(1.0, 2.0, 5.0), Vec3::ZERO, Vec3::Y, 0.7);
+        assert_eq!(Rig::new(&other, BOUNDS).turning_about(Vec3::Z).up(), Vec3::Y);
     }
 
     #[test]

@@ -7,6 +7,7 @@ use egui::emath::GuiRounding;
 use egui::{Key, PointerButton, Rect, Vec2, pos2, vec2};
 use glam::Vec3;
 use sunfleck::inspect;
+use sunfleck::scene::Camera;
 use sunfleck::scene::settings::{CameraSettings, Settings};
 
 use super::app::Viewer;
@@ -69,6 +70,8 @@ impl PictureView {
     /// The picture of a scene that goes: it would keep the scene in memory.
     pub fn forget(&mut self) {
         (self.texture, self.painted, self.hovered) = (None, None, None);
+        // The scene may have another camera now.
+        self.rig = None;
     }
 
     fn take(&mut self, ctx: &egui::Context, painted: &Arc<Painted>) {
@@ -315,8 +318,17 @@ impl Viewer {
         if !known {
             let (camera, bounds) = (self.camera()?, self.opened()?.bounds);
             // Perhaps a lens or a colour was changed, not the place.
-            let kept = self.picture.rig.take().and_then(|(_, mut rig)| rig.change_lens(&camera).then_some(rig));
-            self.picture.rig = Some((settings, kept.unwrap_or_else(|| Rig::new(&camera, bounds))));
+            let rig = match self.picture.rig.take() {
+                Some((_, mut rig)) => match rig.change_lens(&camera) {
+                    true => rig,
+                    false => Rig::new(&camera, bounds).turning_about(rig.up()),
+                },
+                None => {
+                    let axis = self.opened()?.loaded.scene.cameras.first().map_or(Vec3::Y, Camera::up_axis);
+                    Rig::new(&camera, bounds).turning_about(axis)
+                }
+            };
+            self.picture.rig = Some((settings, rig));
         }
         self.picture.rig.as_mut().map(|(_, rig)| rig)
     }

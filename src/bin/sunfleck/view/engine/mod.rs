@@ -106,7 +106,7 @@ pub struct Opened {
     pub source: Source,
     /// The settings as their file has them.
     pub read: Settings,
-    /// As the file has it, before settings; with a camera if it has none.
+    /// As the file has it, before settings; the default camera is added if it has none.
     pub loaded: Loaded,
     /// Least and greatest corner of the scene and of the spheres that its settings add, metres; those of a cube of side 1
     /// about the origin if there is nothing.

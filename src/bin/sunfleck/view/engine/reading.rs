@@ -1,7 +1,8 @@
 //! Reading a scene may take long: a thread of its own does it, which nobody waits for once the scene is not wanted any more.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::{Builder, JoinHandle};
+use std::thread::Builder;
 
 use anyhow::{Result, anyhow};
 use glam::Vec3;
@@ -9,43 +10,51 @@ use glam::Vec3;
 use super::{Board, Choice, Opened, Shared, catch};
 use crate::scenes::Source;
 
-/// Scenes that are read though they were left, at most: each takes memory.
-const MOST_LEFT: usize = 1;
+/// Threads that read, at most, those that were left among them: each holds a scene.
+const MOST: usize = 2;
 
-/// The threads that read.
+/// Starts threads that read.
 #[derive(Default)]
 pub struct Reader {
-    left: Vec<JoinHandle<()>>,
+    /// Under way.
+    n_reading: Arc<AtomicUsize>,
 }
 
 impl Reader {
-    /// Does `read`; none if it `is_left` before that has come to its end.
+    /// Does `read`, as soon as there are not too many at it; none if it `is_left` before that has come to its end, or the
+    /// window closes.
     pub fn read<T: Send + 'static>(
-        &mut self,
+        &self,
         shared: &Arc<Shared>,
         read: impl FnOnce() -> Result<T> + Send + 'static,
         is_left: impl Fn(&Board) -> bool,
     ) -> Result<Option<T>> {
-        self.left.retain(|thread| !thread.is_finished());
-        if self.left.len() > MOST_LEFT {
-            let _ = self.left.remove(0).join();
+        let is_free = || self.n_reading.load(Ordering::Relaxed) < MOST;
+        drop(shared.wait_until(|board| is_free() || is_left(board)));
+        if !is_free() {
+            return Ok(None);
         }
-        let done = Arc::new(Mutex::new(None));
-        let take = |done: &Mutex<Option<_>>| done.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let (done, n_reading) = (Arc::new(Mutex::new(None)), Arc::clone(&self.n_reading));
         let (theirs, result) = (Arc::clone(shared), Arc::clone(&done));
-        let thread = Builder::new().name("read".to_owned()).spawn(move || {
+        let take = |done: &Mutex<Option<_>>| done.lock().unwrap_or_else(PoisonError::into_inner).take();
+        // Counted before it begins, lest another begins as well.
+        self.n_reading.fetch_add(1, Ordering::Relaxed);
+        let started = Builder::new().name("read".to_owned()).spawn(move || {
             let read = catch(read).unwrap_or_else(|panic| Err(anyhow!(panic)));
             *result.lock().unwrap_or_else(PoisonError::into_inner) = Some(read);
+            drop(result);
+            n_reading.fetch_sub(1, Ordering::Relaxed);
             theirs.update(|_| ());
-        })?;
+        });
+        if let Err(error) = started {
+            self.n_reading.fetch_sub(1, Ordering::Relaxed);
+            return Err(error.into());
+        }
         let mut found = None;
         drop(shared.wait_until(|board| {
             found = take(&done);
             found.is_some() || is_left(board)
         }));
-        if found.is_none() {
-            self.left.push(thread);
-        }
         found.transpose()
     }
 }
@@ -57,7 +66,7 @@ pub fn open(choice: &Arc<Choice>) -> Result<Opened> {
     source.set(&choice.set)?;
     let mut loaded = source.scene()?;
     source.settings.add_default_camera(&mut loaded.scene);
-    let bounds = loaded.scene.bounds(&source.settings.spheres()).unwrap_or([-0.5, 0.5].map(Vec3::splat));
+    let bounds = loaded.scene.bounds(&source.settings.added_spheres()).unwrap_or([-0.5, 0.5].map(Vec3::splat));
     Ok(Opened { choice: Arc::clone(choice), source, read, loaded, bounds })
 }
 
@@ -69,7 +78,7 @@ mod tests {
     #[test]
     fn a_scene_can_be_left_while_it_is_read() {
         let shared = Shared::new(Arc::new(|| {}));
-        let mut reader = Reader::default();
+        let reader = Reader::default();
         let never = |_: &Board| false;
         assert_eq!(reader.read(&shared, || Ok(7), never).unwrap(), Some(7));
         let missing = reader.read(&shared, || -> Result<()> { anyhow::bail!("no file") }, never).unwrap_err();
@@ -77,13 +86,19 @@ mod tests {
         let panic = reader.read(&shared, || -> Result<()> { panic!("ouch") }, never).unwrap_err();
         assert_eq!(panic.to_string(), "a bug in sunfleck: ouch");
         // One that takes for ever, and then others.
-        let (hold, held) = channel::<()>();
-        assert_eq!(reader.read(&shared, move || Ok(held.recv()?), |_| true).unwrap(), None);
+        let (end, forever) = channel::<()>();
+        assert_eq!(reader.read(&shared, move || Ok(forever.recv()?), |_| true).unwrap(), None);
         assert_eq!(reader.read(&shared, || Ok(8), never).unwrap(), Some(8));
-        // The window closes.
-        let (other, held) = channel::<()>();
+        // Two of them: the next one waits, and can be left, until one ends; and the window can be closed.
+        let (other, forever) = channel::<()>();
+        assert_eq!(reader.read(&shared, move || Ok(forever.recv()?), |_| true).unwrap(), None);
+        assert_eq!(reader.read(&shared, || Ok(9), |_| true).unwrap(), None);
+        end.send(()).unwrap();
+        assert_eq!(reader.read(&shared, || Ok(9), never).unwrap(), Some(9));
+        let (another, forever) = channel::<()>();
+        assert_eq!(reader.read(&shared, move || Ok(forever.recv()?), |_| true).unwrap(), None);
         shared.board().quit = true;
-        assert_eq!(reader.read(&shared, move || Ok(held.recv()?), never).unwrap(), None);
-        drop((hold, other));
+        assert_eq!(reader.read(&shared, || Ok(10), never).unwrap(), None);
+        drop((other, another));
     }
 }
