@@ -133,7 +133,7 @@ pub struct CameraSettings {
     /// Viewing direction, of any length; instead of `look_at`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub forward: Option<[f32; 3]>,
-    /// What is up in the picture, of any length; default +y.
+    /// What is up in the picture, of any length; by default the axis of the scene's camera ([`super::Camera::up_axis`]), +y or +z.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub up: Option<[f32; 3]>,
     /// Full vertical field of view, degrees.
