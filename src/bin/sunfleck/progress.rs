@@ -123,6 +123,12 @@ pub fn length(metres: f32) -> String {
     }
 }
 
+/// Places after the point that a length among others of this `scale` needs, both in metres.
+#[cfg(feature = "view")]
+pub fn decimals(scale: f64) -> usize {
+    if scale > 0.0 { (2 - scale.log10().floor() as i32).clamp(0, 9) as usize } else { 2 }
+}
+
 pub fn with_prefix(x: f64) -> String {
     match x {
         x if x >= 1e9 => format!("{} G", three_digits(x / 1e9)),

@@ -138,8 +138,9 @@ impl Rig {
     }
 
     /// Approaches the pivot, or with negative `steps` goes away from it: a step is a tenth of the distance. `cursor`,
-    /// in heights of the picture from its middle, x right, y down, is the point that stays where it is.
-    pub fn zoom(&mut self, steps: f32, cursor: Option<Vec2>) {
+    /// in heights of the picture from its middle, x right, y down, is the point that stays where it is: that of the world
+    /// which is `under` it, or one as deep as the pivot.
+    pub fn zoom(&mut self, steps: f32, cursor: Option<Vec2>, under: Option<Vec3>) {
         let scale = 0.9_f32.powf(steps);
         if !(scale.is_finite() && scale > 0.0) {
             return;
@@ -158,11 +159,11 @@ impl Rig {
             return;
         }
         let scale = scale.max((self.nearest() / self.position().distance(self.pivot)).min(1.0));
-        // About the point under the cursor, as deep as the pivot.
-        let target = match across == Vec3::ZERO {
+        let at_pivot = match across == Vec3::ZERO {
             true => self.pivot,
             false => self.position() + forward * self.depth() + across,
         };
+        let target = under.unwrap_or(at_pivot);
         let about = |p: Vec3| target + (p - target) * scale;
         self.stand(about(self.position()), self.axes(), about(self.pivot));
     }
@@ -330,7 +331,7 @@ mod tests {
         Orbit(f32, f32),
         Look(f32, f32),
         Pan(Vec2),
-        Zoom(f32, Option<Vec2>),
+        Zoom(f32, Option<Vec2>, Option<Vec3>),
         Fly(Vec3, Pace, f32),
         FrameAll(f32),
         Fov(f32),
@@ -342,7 +343,7 @@ mod tests {
             Move::Orbit(yaw, pitch) => rig.orbit(yaw, pitch),
             Move::Look(yaw, pitch) => rig.look(yaw, pitch),
             Move::Pan(by) => rig.pan(by),
-            Move::Zoom(steps, cursor) => rig.zoom(steps, cursor),
+            Move::Zoom(steps, cursor, under) => rig.zoom(steps, cursor, under),
             Move::Fly(direction, pace, seconds) => rig.fly(direction, pace, seconds),
             Move::FrameAll(aspect) => rig.frame_all(BOUNDS, aspect),
             Move::Fov(radians) => rig.set_yfov(radians),
@@ -365,7 +366,8 @@ mod tests {
             pair().prop_map(|(a, b)| Move::Orbit(a, b)),
             pair().prop_map(|(a, b)| Move::Look(a, b)),
             pair().prop_map(|(a, b)| Move::Pan(Vec2::new(a, b))),
-            (number(), proptest::option::of(pair())).prop_map(|(n, at)| Move::Zoom(n * 10.0, at.map(Vec2::from))),
+            (number(), proptest::option::of(pair()), proptest::option::of(vector()))
+                .prop_map(|(n, at, under)| Move::Zoom(n * 10.0, at.map(Vec2::from), under)),
             (vector(), number()).prop_map(|(v, s)| Move::Fly(v, Pace::Fast, s)),
             number().prop_map(Move::FrameAll),
             number().prop_map(Move::Fov),
@@ -500,12 +502,21 @@ mod tests {
             let at = seen(rig.camera(), pivot, aspect).unwrap();
             prop_assert!((at - Vec2::new(2.0 * by.x, -2.0 * by.y)).length() < 1e-3, "{at} {by}");
             let distance = rig.position().distance(rig.pivot());
-            rig.zoom(steps, Some(by));
+            rig.zoom(steps, Some(by), None);
             let at = seen(rig.camera(), pivot, aspect).unwrap();
             prop_assert!((at - Vec2::new(2.0 * by.x, -2.0 * by.y)).length() < 2e-3, "{at} {by}");
-            if let Projection::Perspective { .. } = camera.projection {
+            if let Projection::Perspective { yfov } = camera.projection {
                 let wanted = distance * 0.9_f32.powf(steps);
                 prop_assert!((rig.position().distance(rig.pivot()) - wanted).abs() < 1e-3 * wanted);
+                // Something nearer or farther than the pivot.
+                let [right, above, forward] = rig.frame();
+                let depth = rig.depth() * (1.5 + by.x);
+                let half = 2.0 * depth * (0.5 * yfov).tan();
+                let point = rig.position() + forward * depth + (right * by.x - above * by.y) * half;
+                let before = seen(rig.camera(), point, aspect).unwrap();
+                rig.zoom(steps, Some(by), Some(point));
+                let at = seen(rig.camera(), point, aspect).unwrap();
+                prop_assert!((at - before).length() < 2e-3 && (at.x - 2.0 * by.x).abs() < 2e-3, "{at} {before} {by}");
             }
         }
     }
@@ -563,11 +574,11 @@ mod tests {
         let mut rig = Rig::new(&camera, BOUNDS);
         let forward = rig.frame()[2];
         for _ in 0..1000 {
-            rig.zoom(3.0, None);
+            rig.zoom(3.0, None, None);
             assert!((rig.pivot() - rig.position()).dot(forward) > 0.0, "{rig:?}");
         }
         assert!(rig.position().distance(rig.pivot()) < 1e-3);
-        rig.zoom(-20.0, None);
+        rig.zoom(-20.0, None, None);
         assert!((rig.pivot() - rig.position()).normalize().dot(forward) > 0.9);
     }
 

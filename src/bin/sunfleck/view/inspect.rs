@@ -15,7 +15,7 @@ use sunfleck::ppm::film::luminance;
 use super::app::Viewer;
 use super::charts::{bar, bars, bounces, rgb, rgba, short};
 use super::engine::{Comparison, Legend, Painted, Values, View};
-use crate::progress::length;
+use crate::progress::{decimals, length};
 
 /// Of what there is nothing to say about.
 const NONE: &str = "–";
@@ -265,9 +265,10 @@ fn cursor(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
     });
     table(ui, "hit", |ui| {
         row(ui, "Depth", hit.map(|hit| length(hit.depth)), "Of what is seen first, along the view");
-        let vector = |v: Vec3| v.to_array().map(|c| format!("{c:.3}")).join(" ");
-        row(ui, "Position", hit.map(|hit| vector(hit.position)), "Of what is seen first: x, y, z, metres, world space");
-        row(ui, "Normal", hit.map(|hit| vector(hit.normal)), "For shading, on the camera's side, world space");
+        let position = hit.map(|hit| vector(hit.position, decimals(hit.depth.into()).max(3)));
+        row(ui, "Position", position, "Of what is seen first: x, y, z, metres, world space");
+        let normal = hit.map(|hit| vector(hit.normal, 3));
+        row(ui, "Normal", normal, "For shading, on the camera's side, world space");
         let names = hit.and_then(|hit| Some((hit, viewer.opened()?)));
         let material = names.map(|(hit, opened)| material(&opened.loaded.scene, hit.material as usize));
         row(ui, "Material", material, "Of what is seen first; a click selects it");
@@ -314,6 +315,13 @@ fn variance(m2: f32, n_iterations: u32) -> Option<f32> {
 fn on_display(rgb: [f32; 3], painted: &Painted) -> [u8; 3] {
     let shown = display::linear(&[rgb], painted.exposure, painted.painting.look.tonemap);
     shown.first().map_or([0; 3], |rgb| rgb.map(|c| (255.0 * srgb_encode(c) + 0.5) as u8))
+}
+
+/// With so many decimals; no zero is negative.
+fn vector(v: Vec3, decimals: usize) -> String {
+    let unit = 10f64.powi(decimals as i32);
+    let rounded = v.to_array().map(|c| (f64::from(c) * unit).round() / unit + 0.0);
+    rounded.map(|c| format!("{c:.decimals$}")).join(" ")
 }
 
 fn material(scene: &sunfleck::scene::Scene, index: usize) -> String {
@@ -374,6 +382,15 @@ fn whole(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn vectors_show_what_there_is() {
+        assert_eq!(vector(Vec3::new(-1e-4, 0.5, -2.0), 3), "0.000 0.500 -2.000");
+        assert_eq!(vector(Vec3::new(0.001_234, -0.000_01, 0.0), decimals(0.003_888)), "0.00123 -0.00001 0.00000");
+        for (scale, n) in [(2.3, 2), (250.0, 0), (1e-30, 9), (0.0, 2), (f64::NAN, 2)] {
+            assert_eq!(decimals(scale), n, "{scale}");
+        }
+    }
 
     #[test]
     fn a_signed_legend_goes_from_red_to_green() {

@@ -164,6 +164,16 @@ fn click(ui: &egui::Ui, viewer: &mut Viewer, response: &egui::Response, rect: Re
     }
 }
 
+/// What the camera sees first, as it stands now, where `point` is in a picture shown at `rect`; world space, metres.
+fn under(viewer: &mut Viewer, rect: Rect, point: egui::Pos2) -> Option<Vec3> {
+    let painted = Arc::clone(viewer.picture.painted()?);
+    let (scene, params) = (&painted.frame.scene, &painted.frame.params);
+    let camera = viewer.rig()?.camera().pack(params.size[0], params.size[1]);
+    let view = inspect::View::new(camera, params.size, params.crop);
+    let hit = inspect::pick(scene, &view, on_film(rect, painted.size, point)?)?;
+    Some(hit.position)
+}
+
 /// What is being waited for.
 fn waiting(ui: &egui::Ui, viewer: &Viewer, area: Rect) {
     let text = match &viewer.now.phase {
@@ -239,7 +249,10 @@ fn move_camera(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, response: &egui::
     if viewer.rig().is_none() {
         return;
     }
-    let height = area.height().max(1.0);
+    let turn = response.drag_delta() / area.height().max(1.0);
+    // What is shown follows the cursor, however large it is shown.
+    let shown = viewer.picture.rect.unwrap_or(area);
+    let height = shown.height().max(1.0);
     let drag = response.drag_delta() / height;
     let (shift, command) = ui.input(|i| (i.modifiers.shift, i.modifiers.command));
     let mut moves = false;
@@ -253,16 +266,18 @@ fn move_camera(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, response: &egui::
             act(viewer, &mut |rig| rig.pan(glam::vec2(drag.x, drag.y)));
         } else if response.dragged_by(PointerButton::Primary) {
             // What is in front of the pivot follows the cursor.
-            act(viewer, &mut |rig| rig.orbit(ORBIT * drag.x, -ORBIT * drag.y));
+            act(viewer, &mut |rig| rig.orbit(ORBIT * turn.x, -ORBIT * turn.y));
         } else if response.dragged_by(PointerButton::Secondary) {
-            act(viewer, &mut |rig| rig.look(LOOK * drag.x, -LOOK * drag.y));
+            act(viewer, &mut |rig| rig.look(LOOK * turn.x, -LOOK * turn.y));
         }
     }
     if response.hovered() && !command {
         let wheel = ui.input(|i| i.smooth_scroll_delta().y);
         if wheel != 0.0 {
-            let cursor = response.hover_pos().map(|p| (p - area.center()) / height).map(|p| glam::vec2(p.x, p.y));
-            act(viewer, &mut |rig| rig.zoom(wheel * WHEEL, cursor));
+            let pointer = response.hover_pos();
+            let under = pointer.and_then(|p| under(viewer, shown, p));
+            let cursor = pointer.map(|p| (p - shown.center()) / height).map(|p| glam::vec2(p.x, p.y));
+            act(viewer, &mut |rig| rig.zoom(wheel * WHEEL, cursor, under));
         }
     }
     let typing = ui.ctx().egui_wants_keyboard_input();

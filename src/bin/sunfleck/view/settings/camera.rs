@@ -6,14 +6,15 @@ use sunfleck::scene::settings::{CameraSettings, Settings};
 use sunfleck::scene::{Camera, Projection, Scene};
 
 use super::widgets::{Name, metres, named, row, slider};
+use crate::progress::decimals;
 use crate::view::app::Viewer;
 use crate::view::engine::Message;
 
 const CAMERA: Name = Name { name: "Camera", hint: "One of the scene's cameras. Restarts the estimate." };
-const POSITION: Name = Name { name: "Position", hint: "x, y and z; y is up, metres. Restarts the estimate." };
+const POSITION: Name = Name { name: "Position", hint: "x, y and z, metres. Restarts the estimate." };
 const VIEW: Name =
     Name { name: "Field of view", hint: "Full vertical angle of the view, degrees. Restarts the estimate." };
-const HEIGHT: Name = Name { name: "View height", hint: "Half the height of the view, metres. Restarts the estimate." };
+const HEIGHT: Name = Name { name: "Half height", hint: "Half the height of the view, metres. Restarts the estimate." };
 const APERTURE: Name = Name {
     name: "Aperture",
     hint: "Radius of the lens, metres: larger, and what is out of focus blurs more; 0 is a pinhole. Restarts the \
@@ -173,10 +174,11 @@ fn place(ui: &mut Ui, viewer: &mut Viewer, camera: &Camera, file: Option<&File>)
     let reset = row(ui, POSITION, was.is_some(), |ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         let each = egui::vec2(((ui.available_width() - 4.0) / 3.0).max(20.0), ui.spacing().interact_size.y);
-        let speed = f64::from(camera.focus_distance.abs()).clamp(1e-3, 1e3) * 0.005;
+        let scale = camera.focus_distance.abs().clamp(1e-6, 1e6);
+        let (speed, decimals) = (f64::from(scale) * 0.005, decimals(scale.into()));
         let mut drag = |value: &mut f32, name: &str| {
             let drag = DragValue::new(value).speed(speed).range(-1e9..=1e9).update_while_editing(false);
-            named(ui.add_sized(each, drag.max_decimals(2)), name)
+            named(ui.add_sized(each, drag.max_decimals(decimals)), name)
         };
         let [x, y, z] = &mut position;
         let response = drag(x, "x") | drag(y, "y") | drag(z, "z");

@@ -1,5 +1,6 @@
 //! The window, driven without a display; the engine behind it is the real one, on the processor.
 
+mod camera;
 mod files;
 mod panels;
 mod shortcuts;

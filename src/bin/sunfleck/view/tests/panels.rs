@@ -46,7 +46,7 @@ fn the_start_page_opens_what_is_clicked() {
 }
 
 /// With its panels closed, so that a name means one widget.
-fn bare() -> Window {
+pub fn bare() -> Window {
     let mut window = Window::with_picture();
     let remembered = &mut window.viewer().remembered;
     (remembered.show_settings, remembered.show_inspect, remembered.show_convergence) = (false, false, false);
@@ -157,76 +157,6 @@ fn help_has_every_shortcut() {
     for shortcut in SHORTCUTS {
         assert!(window.shows(shortcut.what), "{}", shortcut.what);
     }
-}
-
-#[test]
-fn a_drag_turns_the_camera_and_can_be_undone() {
-    let mut window = bare();
-    let settings = window.viewer().edits.now().clone();
-    let before = window.viewer().camera().unwrap().world_from_camera;
-    // To the right and down: the scene comes along, or the camera turns that way.
-    for (button, modifiers, stands) in [
-        (PointerButton::Primary, Modifiers::NONE, false),
-        (PointerButton::Primary, Modifiers::SHIFT, false),
-        (PointerButton::Middle, Modifiers::NONE, false),
-        (PointerButton::Secondary, Modifiers::NONE, true),
-    ] {
-        let middle = window.harness.get_by_role_and_label(Role::Image, "Picture").rect().center();
-        let events = &mut window.harness.input_mut().events;
-        events.extend([Event::ModifiersChanged(modifiers), Event::PointerMoved(middle)]);
-        window.step();
-        let press = |pos, pressed| Event::PointerButton { pos, button, pressed, modifiers };
-        window.harness.input_mut().events.push(press(middle, true));
-        window.step();
-        for i in 1..=10 {
-            let to = middle + egui::vec2(6.0, 2.0) * i as f32;
-            window.harness.input_mut().events.push(Event::PointerMoved(to));
-            window.step();
-        }
-        let to = middle + egui::vec2(60.0, 20.0);
-        let events = &mut window.harness.input_mut().events;
-        events.extend([press(to, false), Event::ModifiersChanged(Modifiers::NONE)]);
-        window.step();
-        let now = before.inverse() * window.viewer().camera().unwrap().world_from_camera;
-        let moved = if stands { -now.matrix3.z_axis } else { -now.translation };
-        assert!(moved.x > 1e-3 && moved.y < -1e-3, "{button:?} {modifiers:?}: {now}");
-        window.steps(30);
-        window.wait_for_picture();
-        window.press(Modifiers::COMMAND, Key::Z);
-        assert_eq!(*window.viewer().edits.now(), settings, "{button:?} {modifiers:?}: one step");
-        window.steps(90);
-        window.wait_for_picture();
-    }
-}
-
-#[test]
-fn letters_fly() {
-    let mut window = bare();
-    for key in [Key::W, Key::A, Key::S, Key::D] {
-        let before = window.viewer().edits.now().camera.clone();
-        window.press(Modifiers::NONE, key);
-        assert_ne!(window.viewer().edits.now().camera, before, "{key:?}");
-    }
-    let before = window.viewer().edits.now().camera.clone();
-    for key in [Key::Q, Key::E] {
-        window.press(Modifiers::NONE, key);
-    }
-    window.press(Modifiers::COMMAND, Key::S);
-    assert_eq!(window.viewer().edits.now().camera, before);
-    // All down at once, and Ctrl let go before the letter: still no more than a shortcut.
-    let command = Modifiers::COMMAND | Modifiers::CTRL;
-    for key in [Key::S, Key::A] {
-        let event = |pressed, modifiers| Event::Key { key, physical_key: None, pressed, repeat: false, modifiers };
-        let down = [Event::ModifiersChanged(command), event(true, command), Event::ModifiersChanged(Modifiers::NONE)];
-        window.harness.input_mut().events.extend(down);
-        window.steps(5);
-        assert_eq!(window.viewer().edits.now().camera, before, "{key:?}");
-        window.harness.input_mut().events.push(event(false, Modifiers::NONE));
-        window.step();
-        assert!(!window.viewer().picture.flying);
-    }
-    window.press(Modifiers::NONE, Key::A);
-    assert_ne!(window.viewer().edits.now().camera, before);
 }
 
 #[test]
