@@ -1,7 +1,7 @@
 //! The window: its state, and what is where in it.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
@@ -60,6 +60,9 @@ impl First {
     }
 }
 
+/// See [`Viewer::last_save`].
+pub type LastSave = Arc<Mutex<Option<Save>>>;
+
 /// See the module. Panels read and change it.
 pub struct Viewer {
     engine: Engine,
@@ -79,6 +82,7 @@ pub struct Viewer {
     /// Where saving goes without asking, and where the picture of which scene was saved last.
     pub output: Option<PathBuf>,
     pub saved_as: Option<(Option<Arc<Choice>>, PathBuf)>,
+    last_save: LastSave,
     pub convergence: super::convergence::Convergence,
     pub timing: super::timing::Timing,
     /// What was open before.
@@ -117,6 +121,7 @@ impl Viewer {
             compare: Default::default(),
             output: first.output,
             saved_as: None,
+            last_save: LastSave::default(),
             convergence: Default::default(),
             timing: Default::default(),
             previous: None,
@@ -300,6 +305,11 @@ impl Viewer {
         Save { path, look, scene }
     }
 
+    /// How the picture would be saved now; with an empty path if nobody has said where. Kept right at every frame.
+    pub fn last_save(&self) -> LastSave {
+        Arc::clone(&self.last_save)
+    }
+
     /// Where saving goes without asking.
     pub fn place(&self) -> Option<&PathBuf> {
         let saved_as = self.saved_as.as_ref().filter(|(scene, _)| *scene == self.wanted.scene);
@@ -373,6 +383,8 @@ impl Viewer {
             self.timing.ask(began, self.now.estimate);
         }
         self.engine.want(&self.wanted);
+        let last = self.saving_to(self.place().cloned().unwrap_or_default());
+        *self.last_save.lock().unwrap_or_else(PoisonError::into_inner) = Some(last);
     }
 
     fn look_at_engine(&mut self, ui: &egui::Ui) {

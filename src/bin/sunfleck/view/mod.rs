@@ -10,6 +10,7 @@ mod charts;
 mod compare;
 mod convergence;
 mod engine;
+mod exit;
 mod failure;
 mod files;
 mod help;

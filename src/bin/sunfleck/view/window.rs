@@ -8,8 +8,9 @@ use std::{panic, thread};
 use anyhow::{Result, anyhow};
 use eframe::{egui, wgpu};
 
-use super::app::Viewer;
-use super::engine::{Message, Wake, panic_text};
+use super::app::{LastSave, Viewer};
+use super::engine::{Message, Save, Wake, panic_text};
+use super::exit;
 
 /// Where eframe keeps what is remembered, and what the window manager knows the window by.
 const APP_ID: &str = "sunfleck";
@@ -108,6 +109,11 @@ pub fn run(
     options: impl Fn() -> eframe::NativeOptions,
     guest: &mut impl Guest,
 ) -> Result<()> {
+    let (last, write) = (viewer.last_save(), viewer.engine().writer());
+    let _guard = exit::Guard::new(move || {
+        let why = anyhow!("the display is gone");
+        crate::say_error(&crate::one_line(&crate::chain(&with_picture(why, rescue(&last, write)))));
+    });
     loop {
         let (fault, mut n_frames) = (Fault::default(), 0);
         let shown = (&mut *viewer, &mut *guest, &mut n_frames);
@@ -139,10 +145,7 @@ pub fn run(
             (Ok(Err(error)), None) => anyhow!("no window: {}", without_source(&error.to_string())),
             (Err(panic), None) => anyhow!("the window is gone: {panic}"),
         };
-        return Err(match rescue(viewer) {
-            Some(path) => why.context(format!("saved the picture as {}", path.display())),
-            None => why,
-        });
+        return Err(with_picture(why, rescue(&viewer.last_save(), viewer.engine().writer())));
     }
 }
 
@@ -183,11 +186,20 @@ fn library(file: &str) -> Option<String> {
     rest.split('/').nth(1).map(str::to_owned)
 }
 
-/// Writes the newest film where the user wanted pictures, or wherever it can be written; where that is.
-fn rescue(viewer: &Viewer) -> Option<PathBuf> {
+/// Writes the newest film as the last frame would have, or wherever it can be written; where that is.
+fn rescue(last: &LastSave, write: impl Fn(&Save) -> Result<()>) -> Option<PathBuf> {
+    let last = last.lock().unwrap_or_else(PoisonError::into_inner).clone()?;
     let name = format!("sunfleck-{}.exr", std::process::id());
-    let places = [viewer.place().cloned(), Some(PathBuf::from(&name)), Some(std::env::temp_dir().join(&name))];
-    places.into_iter().flatten().find(|path| viewer.engine().save_and_wait(&viewer.saving_to(path.clone())).is_ok())
+    let places = [last.path.clone(), PathBuf::from(&name), std::env::temp_dir().join(&name)];
+    let wanted = places.into_iter().filter(|path| !path.as_os_str().is_empty());
+    wanted.map(|path| Save { path, ..last.clone() }).find(|save| write(save).is_ok()).map(|save| save.path)
+}
+
+fn with_picture(why: anyhow::Error, saved: Option<PathBuf>) -> anyhow::Error {
+    match saved {
+        Some(path) => why.context(format!("saved the picture as {}", path.display())),
+        None => why,
+    }
 }
 
 struct Window<'a, G> {

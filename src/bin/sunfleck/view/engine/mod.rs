@@ -328,10 +328,13 @@ impl Engine {
         });
     }
 
-    /// Writes what there is, and comes back when that is done: for the end.
-    pub fn save_and_wait(&self, save: &Save) -> Result<()> {
-        let frame = self.shared.board().frame.clone();
-        save.write(frame.as_deref().context("there is no picture yet")?).map(|_| ())
+    /// What other threads write what there is with, and come back when that is done: for the end.
+    pub fn writer(&self) -> impl Fn(&Save) -> Result<()> + Send + 'static {
+        let shared = Arc::clone(&self.shared);
+        move |save| {
+            let frame = shared.board().frame.clone();
+            save.write(frame.as_deref().context("there is no picture yet")?).map(|_| ())
+        }
     }
 
     /// Larger pictures are shown reduced, pixels a side.
