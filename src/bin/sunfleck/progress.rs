@@ -123,6 +123,12 @@ pub fn length(metres: f32) -> String {
     }
 }
 
+/// So many of them.
+#[cfg(feature = "view")]
+pub fn iterations(n: u32) -> String {
+    if n == 1 { "1 iteration".to_owned() } else { format!("{n} iterations") }
+}
+
 /// Places after the point that a length among others of this `scale` needs, both in metres.
 #[cfg(feature = "view")]
 pub fn decimals(scale: f64) -> usize {

@@ -234,7 +234,7 @@ impl Viewer {
     /// Brightens the picture by so many stops.
     pub fn expose(&mut self, stops: f32) {
         let now = self.wanted.painting.look.exposure.or(self.now.painted.as_ref().map(|painted| painted.exposure));
-        self.wanted.painting.look.exposure = Some((2.0 * (now.unwrap_or(0.0) + stops)).round() / 2.0);
+        self.wanted.painting.look.exposure = Some(now.unwrap_or(0.0) + stops);
     }
 
     /// In a narrow window it gives way to the settings, so that the picture does not.
@@ -421,7 +421,7 @@ impl Viewer {
         let title = match &self.wanted.scene {
             Some(choice) => {
                 let n = self.now.frame.as_ref().map_or(0, |frame| frame.film.n_iterations);
-                format!("{} – {n} iterations – Sunfleck", choice.name)
+                format!("{} – {} – Sunfleck", choice.name, crate::progress::iterations(n))
             }
             None => "Sunfleck".to_owned(),
         };

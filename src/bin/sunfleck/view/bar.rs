@@ -212,7 +212,7 @@ pub fn status(ui: &mut egui::Ui, viewer: &Viewer) {
             let [width, height] = frame.params.size;
             let n = frame.film.n_iterations;
             ui.separator();
-            ui.label(format!("{n} iterations, {}", progress::seconds(frame.seconds)));
+            ui.label(format!("{}, {}", progress::iterations(n), progress::seconds(frame.seconds)));
             ui.separator();
             ui.label(format!("{width}×{height}"));
             ui.separator();

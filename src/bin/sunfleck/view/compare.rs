@@ -144,7 +144,7 @@ pub fn section(ui: &mut egui::Ui, viewer: &mut Viewer) {
         let frame = viewer.now.frame.clone().filter(|frame| !frame.is_preview);
         let pin = ui.add_enabled(frame.is_some(), egui::Button::new("Pin"));
         if let (true, Some(frame)) = (pin.on_hover_text("The picture as it is now as the reference").clicked(), frame) {
-            let name = format!("picture after {} iterations", frame.film.n_iterations);
+            let name = format!("picture after {}", crate::progress::iterations(frame.film.n_iterations));
             let reference = Reference { name, picture: frame.picture() };
             viewer.engine().set_reference(Some(Arc::new(reference)));
         }

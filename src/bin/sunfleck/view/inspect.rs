@@ -285,7 +285,9 @@ fn cursor(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
             gathered,
             "Gathered by an iteration, on average; a view or photons that need them must be on",
         );
-        let radius = film.and_then(|(painted, i, ..)| Some(painted.frame.first_radii.get(i)? * shrunk(painted)));
+        let radius = film
+            .filter(|_| hit.is_some())
+            .and_then(|(painted, i, ..)| Some(painted.frame.first_radii.get(i)? * shrunk(painted)));
         row(ui, "Radius", radius.map(length), "Of the estimate, now");
         let variance = film.and_then(|(painted, _, _, m2)| variance(m2, painted.frame.film.n_iterations));
         row(ui, "Variance", variance.map(short), "Of the mean luminance, estimated");

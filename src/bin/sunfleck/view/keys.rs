@@ -92,6 +92,10 @@ pub fn handle(ui: &mut egui::Ui, viewer: &mut Viewer) {
         _ => None,
     };
     ui.input(|i| viewer.picture.not_flying.extend(i.events.iter().filter_map(modified)));
+    // What a held key repeats is no other press of it, but for what is done with Ctrl, undo among it.
+    let is_repeated =
+        |event: &egui::Event| matches!(event, egui::Event::Key { repeat: true, modifiers, .. } if !modifiers.command);
+    ui.input_mut(|i| i.events.retain(|event| !is_repeated(event)));
     for shortcut in SHORTCUTS {
         // A question mark needs Shift on most keyboards.
         let keys = shortcut.keys;

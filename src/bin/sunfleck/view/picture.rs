@@ -12,6 +12,7 @@ use sunfleck::scene::settings::{CameraSettings, Settings};
 
 use super::app::Viewer;
 use super::camera::{Pace, Rig};
+use super::charts::short;
 use super::engine::{Painted, Phase};
 
 /// Radians an orbit turns over the picture's height.
@@ -157,7 +158,8 @@ fn click(ui: &egui::Ui, viewer: &mut Viewer, response: &egui::Response, rect: Re
     let n_materials = viewer.opened().map_or(0, |opened| opened.loaded.scene.materials.len());
     viewer.selected = hit.map(|hit| hit.material as usize).filter(|&index| index < n_materials);
     if let (true, Some(hit)) = (response.double_clicked_by(PointerButton::Primary), hit) {
-        viewer.move_rig(ui.input(|i| i.time), &mut |rig| {
+        // Nothing moves.
+        viewer.change_rig(ui.input(|i| i.time), &mut |rig| {
             rig.set_pivot(hit.position);
             rig.focus_on(hit.position);
         });
@@ -231,7 +233,7 @@ fn values(painter: &egui::Painter, area: Rect, rect: Rect, painted: &Painted) {
             let corner = rect.min + vec2(x as f32, y as f32) * side;
             let shade = painted.rgba[4 * i..4 * i + 3].iter().map(|&c| u32::from(c)).sum::<u32>();
             let color = if shade > 384 { egui::Color32::BLACK } else { egui::Color32::WHITE };
-            let lines: Vec<String> = painted.value(x, y).iter().map(|v| format!("{v:.3}")).collect();
+            let lines: Vec<String> = painted.value(x, y).iter().map(|&v| short(v)).collect();
             painter.text(
                 corner + Vec2::splat(0.5 * side),
                 egui::Align2::CENTER_CENTER,
@@ -348,8 +350,13 @@ impl Viewer {
         self.picture.rig.as_mut().map(|(_, rig)| rig)
     }
 
-    /// Moves the camera, and with it the settings.
+    /// Moves the camera, and with it the settings; previews until it rests.
     pub fn move_rig(&mut self, time: f64, change: &mut dyn FnMut(&mut Rig)) {
+        self.change_rig(time, change);
+        self.picture.move_on(time);
+    }
+
+    fn change_rig(&mut self, time: f64, change: &mut dyn FnMut(&mut Rig)) {
         let Some(rig) = self.rig() else { return };
         change(rig);
         let camera = CameraSettings::from(rig.camera());
@@ -357,7 +364,6 @@ impl Viewer {
         if let Some((of, _)) = &mut self.picture.rig {
             *of = Arc::clone(self.edits.now());
         }
-        self.picture.move_on(time);
     }
 
     /// Of the picture that is wanted, pixels.

@@ -11,7 +11,7 @@ use sunfleck::output;
 use sunfleck::output::display::Look;
 
 use super::{Board, Choice, Frame, Message, Phase, Shared, catch};
-use crate::job;
+use crate::{job, progress};
 
 /// What to write, and where.
 #[derive(Clone, Debug, PartialEq)]
@@ -84,8 +84,7 @@ pub fn run(shared: &Shared) {
             Err(why) => Ok(Err(format!("{path} was not written: {why}"))),
         };
         let message = match done.flatten() {
-            Ok(1) => Message::Said(format!("saved {path} after 1 iteration")),
-            Ok(n) => Message::Said(format!("saved {path} after {n} iterations")),
+            Ok(n) => Message::Said(format!("saved {path} after {}", progress::iterations(n))),
             Err(error) => Message::Error(error),
         };
         shared.update(|board| match message {

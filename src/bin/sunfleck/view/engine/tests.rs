@@ -373,6 +373,27 @@ fn a_scene_that_is_left_is_freed() {
     assert_eq!(left.len(), 20);
 }
 
+/// A pinhole has everything in focus.
+#[test]
+fn the_focus_restarts_what_it_changes() {
+    let mut bench = Bench::open("cornell", until(3));
+    let before = bench.wait_for_film(&Phase::Reached, 3);
+    let mut camera = before.opened.as_ref().unwrap().loaded.scene.cameras[0].clone();
+    camera.aperture_radius = 0.0;
+    camera.focus_distance *= 1.5;
+    bench.set(|settings| settings.camera = Some(CameraSettings::from(&camera)));
+    bench.wanted.limits = until(4);
+    bench.send();
+    assert_eq!(bench.wait_for_film(&Phase::Reached, 4).estimate, before.estimate);
+    camera.aperture_radius = 0.1;
+    bench.set(|settings| settings.camera = Some(CameraSettings::from(&camera)));
+    let open = bench.wait("a lens", |now| now.estimate > before.estimate && now.phase == Phase::Reached);
+    assert_eq!(open.frame.as_ref().unwrap().camera.focus_distance, camera.focus_distance);
+    camera.focus_distance *= 2.0;
+    bench.set(|settings| settings.camera = Some(CameraSettings::from(&camera)));
+    bench.wait("another focus", |now| now.estimate > open.estimate);
+}
+
 #[test]
 fn a_lost_device_is_opened_again() {
     let device = match crate::devices::open_backend("gpu") {

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use anyhow::Result;
+use sunfleck::layout;
 use sunfleck::ppm::Error;
 use sunfleck::scene::Accelerator;
 use sunfleck::scene::settings::{Index, Settings};
@@ -259,10 +260,17 @@ fn is_rendered_alike(opened: &Opened, before: &Wanted, now: &Wanted) -> bool {
     is_same(before.settings.as_ref(), now.settings.as_ref()) || rendered(opened, before) == rendered(opened, now)
 }
 
-/// Those settings that the estimate depends on.
-fn rendered(opened: &Opened, wanted: &Wanted) -> Settings {
+/// Those settings that the estimate depends on: of the camera, what it comes to.
+fn rendered(opened: &Opened, wanted: &Wanted) -> (Settings, Option<(layout::Camera, Option<f32>)>) {
     let settings = wanted.settings.as_deref().unwrap_or(&opened.source.settings);
-    Settings { exposure: None, iterations: None, seconds: None, ..searched(settings) }
+    let camera = settings.camera_of(&opened.loaded.scene.cameras).ok().map(|mut camera| {
+        if camera.aperture_radius == 0.0 {
+            camera.focus_distance = 1.0;
+        }
+        (camera.pack(1, 1), camera.aspect)
+    });
+    let of_camera = settings.camera.clone().filter(|_| camera.is_none());
+    (Settings { exposure: None, iterations: None, seconds: None, camera: of_camera, ..searched(settings) }, camera)
 }
 
 /// The same, with nothing in the place of the default ways to search.

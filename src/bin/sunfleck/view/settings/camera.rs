@@ -173,6 +173,8 @@ fn place(ui: &mut Ui, viewer: &mut Viewer, camera: &Camera, file: Option<&File>)
     let was = file.and_then(|file| file.camera.position).filter(|was| *was != position);
     let reset = row(ui, POSITION, was.is_some(), |ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
+        // So that a sign does not widen the panel.
+        ui.spacing_mut().button_padding.x = 1.0;
         let each = egui::vec2(((ui.available_width() - 4.0) / 3.0).max(20.0), ui.spacing().interact_size.y);
         let scale = camera.focus_distance.abs().clamp(1e-6, 1e6);
         let (speed, decimals) = (f64::from(scale) * 0.005, decimals(scale.into()));
