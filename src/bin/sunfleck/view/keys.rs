@@ -99,11 +99,12 @@ pub fn handle(ui: &mut egui::Ui, viewer: &mut Viewer) {
     for shortcut in SHORTCUTS {
         // A question mark needs Shift on most keyboards.
         let keys = shortcut.keys;
-        let pressed = match keys.logical_key {
-            Key::Questionmark => ui.input(|i| i.key_pressed(Key::Questionmark)),
-            _ => ui.input_mut(|i| i.consume_shortcut(&keys)),
+        let n_presses = match keys.logical_key {
+            Key::Questionmark => ui.input(|i| i.num_presses(Key::Questionmark)),
+            key => ui.input_mut(|i| i.count_and_consume_key(keys.modifiers, key)),
         };
-        if pressed {
+        // A frame may take longer than two presses.
+        for _ in 0..n_presses {
             (shortcut.action)(ui, viewer);
         }
     }

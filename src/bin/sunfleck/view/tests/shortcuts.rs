@@ -266,3 +266,23 @@ fn every_shortcut_is_tested() {
     }
     assert_eq!(CASES.len(), SHORTCUTS.len());
 }
+
+/// However long a frame takes, and however long a key is held.
+#[test]
+fn each_press_counts_once() {
+    let mut window = Window::with_picture();
+    window.viewer().wanted.painting.look.exposure = Some(1.0);
+    let event = |pressed, repeat| egui::Event::Key {
+        key: Key::E,
+        physical_key: None,
+        pressed,
+        repeat,
+        modifiers: Modifiers::NONE,
+    };
+    let presses = [event(true, false), event(true, true), event(false, false), event(true, false), event(true, true)];
+    window.harness.input_mut().events.extend(presses);
+    window.step();
+    window.harness.input_mut().events.extend([event(true, true), event(false, false)]);
+    window.step();
+    assert_eq!(window.viewer().wanted.painting.look.exposure, Some(2.0));
+}
