@@ -156,6 +156,14 @@ fn three_digits(x: f64) -> String {
 mod tests {
     use super::*;
 
+    #[cfg(feature = "view")]
+    #[test]
+    fn small_lengths_have_more_decimals() {
+        for (scale, n) in [(2.3, 2), (250.0, 0), (1e-30, 9), (0.0, 2), (f64::NAN, 2)] {
+            assert_eq!(decimals(scale), n, "{scale}");
+        }
+    }
+
     #[test]
     fn numbers_for_people() {
         assert_eq!(seconds(4.25), "4.2 s");

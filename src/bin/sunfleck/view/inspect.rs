@@ -389,9 +389,6 @@ mod tests {
     fn vectors_show_what_there_is() {
         assert_eq!(vector(Vec3::new(-1e-4, 0.5, -2.0), 3), "0.000 0.500 -2.000");
         assert_eq!(vector(Vec3::new(0.001_234, -0.000_01, 0.0), decimals(0.003_888)), "0.00123 -0.00001 0.00000");
-        for (scale, n) in [(2.3, 2), (250.0, 0), (1e-30, 9), (0.0, 2), (f64::NAN, 2)] {
-            assert_eq!(decimals(scale), n, "{scale}");
-        }
     }
 
     #[test]
