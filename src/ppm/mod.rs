@@ -10,7 +10,7 @@ pub mod stages;
 
 use crate::layout;
 pub use film::Film;
-pub use radius::{RadiusSchedule, first_radii};
+pub use radius::{FirstRadii, RadiusSchedule, first_radii};
 pub use stages::{Error, Interrupt, StageTimes, Stages};
 
 /// Density estimation kernel over t = d/r, each with unit integral over the disc.
@@ -135,13 +135,13 @@ impl Params {
 /// Of the pixels of a preview, in either direction, one in so many is searched for its first radius.
 const PREVIEW_STEP: usize = 3;
 
-/// Chooses the first radii, tells the backend and returns them, metres, `[h·w]`. Call before the first [`iterate`].
-pub fn start<S: Stages + ?Sized>(stages: &mut S, params: &Params) -> Result<Vec<f32>, Error> {
+/// Chooses the first radii, tells the backend and returns them. Call before the first [`iterate`].
+pub fn start<S: Stages + ?Sized>(stages: &mut S, params: &Params) -> Result<FirstRadii, Error> {
     let radii = match params.radius {
         FirstRadius::Fixed(r) => fixed(params, r),
         FirstRadius::Automatic => automatic(stages, &params.frame(0), 1)?,
     };
-    stages.set_first_radii(&radii)?;
+    stages.set_first_radii(&radii.each)?;
     Ok(radii)
 }
 
@@ -149,7 +149,7 @@ pub fn start<S: Stages + ?Sized>(stages: &mut S, params: &Params) -> Result<Vec<
 /// within, and not every pixel is searched. For a look at the scene, not to be averaged over many: within the distance to
 /// the k-th of them, points of density ρ have the expected density ρ·k/(k−1). Epanechnikov's kernel, which is 0 for the k-th,
 /// makes up for it; the constant one is made a little narrower, so that the k-th is left out.
-pub fn start_preview<S: Stages + ?Sized>(stages: &mut S, params: &Params) -> Result<Vec<f32>, Error> {
+pub fn start_preview<S: Stages + ?Sized>(stages: &mut S, params: &Params) -> Result<FirstRadii, Error> {
     let frame = params.frame(1);
     let radii = match params.radius {
         FirstRadius::Fixed(r) => {
@@ -160,25 +160,25 @@ pub fn start_preview<S: Stages + ?Sized>(stages: &mut S, params: &Params) -> Res
         FirstRadius::Automatic => {
             let mut radii = automatic(stages, &frame, PREVIEW_STEP)?;
             if params.kernel == Kernel::Constant {
-                radii.iter_mut().for_each(|radius| *radius *= 1.0 - 1e-4);
+                radii.each.iter_mut().for_each(|radius| *radius *= 1.0 - 1e-4);
             }
             radii
         }
     };
-    stages.set_first_radii(&radii)?;
+    stages.set_first_radii(&radii.each)?;
     stages.build_index(&frame)?;
     stages.gather(&frame)?;
     stages.accumulate(&frame)?;
     Ok(radii)
 }
 
-fn fixed(params: &Params, radius: f32) -> Vec<f32> {
+fn fixed(params: &Params, radius: f32) -> FirstRadii {
     let [width, height] = params.film_size();
-    vec![radius; width as usize * height as usize]
+    FirstRadii::fixed(radius, width as usize * height as usize)
 }
 
 /// From the eye paths and photons of `frame`, which the stages have afterwards.
-fn automatic<S: Stages + ?Sized>(stages: &mut S, frame: &layout::Frame, step: usize) -> Result<Vec<f32>, Error> {
+fn automatic<S: Stages + ?Sized>(stages: &mut S, frame: &layout::Frame, step: usize) -> Result<FirstRadii, Error> {
     stages.trace_eye(frame)?;
     stages.trace_photons(frame)?;
     let (eye, photons) = (stages.eye_vertices()?, stages.photons()?);

@@ -48,8 +48,44 @@ const MOST_OF_MEDIAN: f32 = 4.0;
 /// The radius is at least this share of the pixel's width on the surface: what is finer, the pixel blurs anyway.
 const LEAST_OF_PIXEL: f32 = 0.7;
 
-/// First radius of each film pixel, metres, `[h·w]`: to the tenth nearest photon of a first pass, between a share of the
-/// pixel's footprint and a multiple of the picture's median. Pixels that gather nothing take the median.
+/// First radius of each film pixel.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FirstRadii {
+    /// Metres, `[h·w]`, above 0.
+    pub each: Vec<f32>,
+    /// Whether it was chosen for what is there, `[h·w]`. Elsewhere the pilot's path had nothing to gather (a lamp, the sky),
+    /// and the radius is that of pixels nearby, for a later path that has.
+    pub gathers: Vec<bool>,
+}
+
+impl FirstRadii {
+    /// The same for `n` pixels, asked for.
+    pub(super) fn fixed(radius: f32, n: usize) -> Self {
+        Self { each: vec![radius; n], gathers: vec![true; n] }
+    }
+
+    /// Metres of the pixels that gather, row-major.
+    pub fn gathering(&self) -> impl Iterator<Item = f32> {
+        self.each.iter().zip(&self.gathers).filter_map(|(&radius, &gathers)| gathers.then_some(radius))
+    }
+
+    /// Of the pixels that gather, of all if none does: the smallest, the median and the largest, metres. 0 without pixels.
+    pub fn spread(&self) -> [f32; 3] {
+        let mut radii: Vec<f32> = self.gathering().collect();
+        if radii.is_empty() {
+            radii.clone_from(&self.each);
+        }
+        if radii.is_empty() {
+            return [0.0; 3];
+        }
+        let middle = radii.len() / 2;
+        let (below, &mut median, above) = radii.select_nth_unstable_by(middle, f32::total_cmp);
+        [below.iter().copied().fold(median, f32::min), median, above.iter().copied().fold(median, f32::max)]
+    }
+}
+
+/// To the tenth nearest photon of a first pass, between a share of the pixel's footprint and a multiple of the picture's
+/// median. Where the pilot's path gathers nothing: the mean of the pixels around, or the median.
 ///
 /// One pixel of each square of `step` by `step` is searched around for all of them; 1: each for itself.
 pub fn first_radii(
@@ -59,10 +95,11 @@ pub fn first_radii(
     photons: &[Photon],
     step: usize,
     interrupt: &Interrupt,
-) -> Result<Vec<f32>, Error> {
+) -> Result<FirstRadii, Error> {
     let mut tree = PointBvh::default();
     tree.rebuild(photons.len(), |i| photons[i].position.into());
     let gathers = |v: &EyeVertex| v.flags & EYE_GATHER != 0;
+    let gathering = eye.iter().map(gathers).collect();
     // A first look at some of the pixels bounds the search for all of them.
     let every = (eye.len() / 4096).max(1);
     let sample: Vec<&EyeVertex> = eye.iter().step_by(every).filter(|v| gathers(v)).collect();
@@ -74,7 +111,7 @@ pub fn first_radii(
     let mut distances: Vec<f32> = sample.par_iter().filter_map(|v| reach(v, f32::INFINITY)).collect();
     distances.sort_unstable_by(f32::total_cmp);
     let Some(&median) = distances.get(distances.len() / 2) else {
-        return Ok(vec![without_photons(frame, camera, eye); eye.len()]);
+        return Ok(FirstRadii { each: vec![without_photons(frame, camera, eye); eye.len()], gathers: gathering });
     };
     let most = median * MOST_OF_MEDIAN;
     let mut radii = vec![0.0; eye.len()];
@@ -97,7 +134,7 @@ pub fn first_radii(
         Ok::<_, Error>(())
     })?;
     fill_gaps(&mut radii, width, median);
-    Ok(radii)
+    Ok(FirstRadii { each: radii, gathers: gathering })
 }
 
 /// Width of a pixel where its eye path ended, as if that path had been straight; metres.

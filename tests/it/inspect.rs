@@ -138,11 +138,11 @@ fn the_parts_of_the_light_add_up_to_it() {
             let frame = params.frame(i);
             ppm::iterate(&mut stages, &frame).expect("iteration");
             let (vertices, photons) = (stages.eye_vertices().expect("eye"), stages.photons().expect("photons"));
-            let iteration = Iteration::new(&packed, &frame, &vertices, &first_radii, &photons);
+            let iteration = Iteration::new(&packed, &frame, &vertices, &first_radii.each, &photons);
             let split = iteration.split();
             assert_sums(&split, &stages.radiance().expect("radiance"));
             let radii = iteration.radii();
-            assert!(radii.iter().zip(&first_radii).all(|(r, first)| *r == first * frame.radius_scale));
+            assert!(radii.iter().zip(&first_radii.each).all(|(r, first)| *r == first * frame.radius_scale));
             let nodes = iteration.nodes_visited();
             for (pixel, parts) in split.pixels.iter().enumerate().step_by(7) {
                 let expected = brute_force(&frame, &vertices[pixel], radii[pixel], &photons);
@@ -304,5 +304,33 @@ fn a_fixed_radius_is_the_radius_of_every_pixel() {
     let mut stages = CpuStages::new(packed.clone(), scene.cameras[0].pack(4, 4), [4, 4]);
     let radii = ppm::start(&mut stages, &params).expect("start");
     let frame = params.frame(1);
-    assert_eq!(Iteration::new(&packed, &frame, &[], &radii, &[]).radii(), [0.25; 16]);
+    assert_eq!(Iteration::new(&packed, &frame, &[], &radii.each, &[]).radii(), [0.25; 16]);
+}
+
+#[test]
+fn only_pixels_that_gather_have_a_radius_to_tell() {
+    let mut scene = ball(Material::default());
+    // Of the upper half the sky is seen, and nothing that reaches it.
+    scene.cameras[0] = Camera::look_at("", Vec3::new(0.0, 0.5, 5.0), Vec3::new(0.0, 0.5, 0.0), Vec3::Y, 0.6);
+    let packed = Arc::new(PackedScene::new(&scene));
+    let params = Params { n_paths: 20_000, ..Params::new(SIZE, SIZE) };
+    let mut stages = CpuStages::new(packed.clone(), scene.cameras[0].pack(SIZE, SIZE), params.film_size());
+    let radii = ppm::start(&mut stages, &params).expect("start");
+    let n = radii.gathers.iter().filter(|gathers| **gathers).count();
+    assert!((200..700).contains(&n), "{n} pixels gather");
+    stages.trace_eye(&params.frame(0)).expect("the pilot's paths");
+    let vertices = stages.eye_vertices().expect("eye");
+    assert!(vertices.iter().zip(&radii.gathers).all(|(v, &gathers)| gathers == (v.flags & EYE_GATHER != 0)));
+    // The others have one for paths that hit something later.
+    assert!(radii.each.iter().all(|r| *r > 0.0 && r.is_finite()));
+    let mut gathering: Vec<f32> = radii.gathering().collect();
+    gathering.sort_unstable_by(f32::total_cmp);
+    assert_eq!(gathering.len(), n);
+    assert_eq!(radii.spread(), [gathering[0], gathering[n / 2], gathering[n - 1]]);
+    // Without light there is nothing to go by.
+    scene.lights.clear();
+    let mut stages = CpuStages::new(Arc::new(PackedScene::new(&scene)), stages.camera(), params.film_size());
+    let dark = ppm::start(&mut stages, &params).expect("start");
+    let [smallest, _, largest] = dark.spread();
+    assert!(dark.gathers == radii.gathers && smallest == largest && smallest > 0.0);
 }

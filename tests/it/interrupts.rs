@@ -144,7 +144,9 @@ fn a_preview_is_the_first_iteration(stages: &mut dyn Stages) {
     ppm::iterate(stages, &params.frame(1)).expect("iteration");
     let film = stages.film().expect("film");
     stages.set_camera(stages.camera(), SIZE).expect("room");
-    assert_eq!(ppm::start_preview(stages, &params).expect("preview"), [0.1].repeat(film.pixels.len()));
+    let radii = ppm::start_preview(stages, &params).expect("preview");
+    assert_eq!(radii.spread(), [0.1; 3]);
+    assert_eq!(radii.each, [0.1].repeat(film.pixels.len()));
     assert_eq!(stages.film().expect("film"), film);
     // And the second goes on from there.
     ppm::iterate(stages, &params.frame(2)).expect("iteration");
@@ -178,7 +180,7 @@ fn a_preview_is_as_bright_as_the_picture() {
             ppm::iterate(&mut stages, &params.frame(1)).expect("iteration");
             pictures += mean(&mut stages);
             stages.set_camera(stages.camera(), SIZE).expect("room");
-            let [coarse, fine] = [coarse, fine].map(|radii| radii.iter().map(|r| f64::from(r.ln())).sum::<f64>());
+            let [coarse, fine] = [coarse, fine].map(|radii| radii.each.iter().map(|r| f64::from(r.ln())).sum::<f64>());
             let ratio = ((coarse - fine) / f64::from(SIZE[0] * SIZE[1])).exp();
             assert!((0.95..1.05).contains(&ratio), "seed {seed}: radii {ratio} times as large");
         }

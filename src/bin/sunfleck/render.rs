@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, anyhow, bail};
 use sunfleck::layout::Camera;
 use sunfleck::output::{self, Picture};
-use sunfleck::ppm::{self, Error, Film, FirstRadius, Params, RadiusSchedule, Stages};
+use sunfleck::ppm::{self, Error, Film, FirstRadii, FirstRadius, Params, RadiusSchedule, Stages};
 
 use crate::cli::RenderArgs;
 use crate::devices;
@@ -30,7 +30,7 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode> {
     let mut stages = timed(&mut seconds.prepare, || device.stages(&input))?; // scene → device's memory
     let stages = &mut *stages;
     let radii = timed(&mut seconds.start, || start(stages, &input.params, job.one_radius))?; // first photons → radii
-    let mut run = Run::new(&job, args, &input, &device, stages, Radii::of(&radii), seconds);
+    let mut run = Run::new(&job, args, &input, &device, stages, radii.spread(), seconds);
     if args.verbose {
         run.describe(&input, &progress);
     }
@@ -63,29 +63,14 @@ pub fn run(args: &RenderArgs) -> Result<ExitCode> {
 }
 
 /// Runs the pilot; for one radius everywhere, again with the median of what it chose.
-pub fn start(stages: &mut dyn Stages, params: &Params, one_radius: bool) -> Result<Vec<f32>> {
+pub fn start(stages: &mut dyn Stages, params: &Params, one_radius: bool) -> Result<FirstRadii> {
     let radii = ppm::start(stages, params)?;
     if !one_radius {
         return Ok(radii);
     }
-    let radius = FirstRadius::Fixed(Radii::of(&radii).median);
+    let [_, median, _] = radii.spread();
+    let radius = FirstRadius::Fixed(median);
     Ok(ppm::start(stages, &Params { radius, ..params.clone() })?)
-}
-
-/// First radii over the pixels, metres.
-struct Radii {
-    smallest: f32,
-    median: f32,
-    largest: f32,
-}
-
-impl Radii {
-    fn of(radii: &[f32]) -> Self {
-        let mut radii: Vec<_> = radii.iter().copied().filter(|r| *r > 0.0 && r.is_finite()).collect();
-        radii.sort_unstable_by(f32::total_cmp);
-        let at = |i: usize| radii.get(i).copied().unwrap_or(0.0);
-        Self { smallest: at(0), median: at(radii.len() / 2), largest: at(radii.len().saturating_sub(1)) }
-    }
 }
 
 /// A render under way: what will be reported, and what is safe already.
@@ -94,7 +79,8 @@ struct Run<'a> {
     args: &'a RenderArgs,
     params: &'a Params,
     camera: Camera,
-    radii: Radii,
+    /// First ones: the smallest, the median, the largest; metres.
+    radii: [f32; 3],
     report: Report,
     /// The last film read back, and when.
     film: Film,
@@ -109,7 +95,7 @@ impl<'a> Run<'a> {
         input: &'a Input,
         device: &devices::Device,
         stages: &dyn Stages,
-        radii: Radii,
+        radii: [f32; 3],
         seconds: Seconds,
     ) -> Self {
         let (params, now) = (&input.params, Instant::now());
@@ -127,7 +113,7 @@ impl<'a> Run<'a> {
             end: End::Failed,
             error: None,
             seconds,
-            radius: Radius { first: radii.median, last: radii.median },
+            radius: Radius { first: radii[1], last: radii[1] },
             outputs: vec![],
             iterations: vec![],
         };
@@ -141,7 +127,7 @@ impl<'a> Run<'a> {
         let frame = self.params.frame(i);
         ppm::iterate(stages, &frame)?;
         let stage_times = stages.times()?;
-        self.report.radius.last = self.radii.median * frame.radius_scale;
+        self.report.radius.last = self.radii[1] * frame.radius_scale;
         self.report.iterations.push(Iteration {
             seconds: this.elapsed().as_secs_f64(),
             stages: stage_times,
@@ -229,8 +215,8 @@ impl<'a> Run<'a> {
             accelerator: self.report.device.accelerator.clone(),
             seed: params.seed,
             alpha: params.alpha,
-            first_radius: self.radii.median,
-            last_radius: self.radii.median * RadiusSchedule::new(params.alpha).scale(n),
+            first_radius: self.radii[1],
+            last_radius: self.radii[1] * RadiusSchedule::new(params.alpha).scale(n),
             iterations: n,
             photons_per_iteration: params.n_paths,
             seconds: self.report.seconds.render,
@@ -317,9 +303,9 @@ impl<'a> Run<'a> {
             format!("photons: {} paths an iteration, alpha {:.4}, {:?}", params.n_paths, params.alpha, params.kernel),
             format!(
                 "first radius: {}, from {} to {}",
-                progress::length(self.radii.median),
-                progress::length(self.radii.smallest),
-                progress::length(self.radii.largest),
+                progress::length(self.radii[1]),
+                progress::length(self.radii[0]),
+                progress::length(self.radii[2]),
             ),
             format!(
                 "load {:.2} s, prepare {:.2} s, first photons {:.2} s",

@@ -22,7 +22,7 @@ use clap::Args;
 use serde_json::json;
 use sunfleck::index::Buffers;
 use sunfleck::layout::Frame;
-use sunfleck::ppm::{Params, Stages};
+use sunfleck::ppm::{FirstRadii, Params, Stages};
 use sunfleck::scene::settings::parse_count;
 use sunfleck::scene::{PackedScene, shipped};
 
@@ -231,7 +231,7 @@ struct Runner {
     stages: Box<dyn Stages>,
     /// The renderer's first, then the others.
     cells: Vec<Cell>,
-    first_radii: Vec<f32>,
+    first_radii: FirstRadii,
     buffers: Buffers,
 }
 
@@ -309,7 +309,7 @@ impl Runner {
             return Ok(());
         }
         let (photons, vertices, right) = (stages.photons()?, stages.eye_vertices()?, stages.radiance()?);
-        let input = gathers::Input::new(scene, frame, &photons, &vertices, first_radii)?;
+        let input = gathers::Input::new(scene, frame, &photons, &vertices, &first_radii.each)?;
         for cell in &mut cells[1..] {
             let Gathered { build, gather, radiance } = match cell.method {
                 Method::KdBuffered => input.kd_buffered(buffers)?,

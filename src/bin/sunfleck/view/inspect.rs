@@ -10,6 +10,7 @@ use sunfleck::output::difference::Measure;
 use sunfleck::output::display;
 use sunfleck::output::false_colour;
 use sunfleck::output::tonemap::srgb_encode;
+use sunfleck::ppm::FirstRadii;
 use sunfleck::ppm::film::luminance;
 
 use super::app::Viewer;
@@ -37,8 +38,8 @@ impl InspectView {
         }
         let frame = &painted.frame;
         let (mut sum, mut n) = (0.0, 0u32);
-        for radius in frame.first_radii.iter().filter(|r| **r > 0.0 && r.is_finite()) {
-            sum += f64::from(*radius);
+        for radius in frame.first_radii.gathering() {
+            sum += f64::from(radius);
             n += 1;
         }
         self.mean_radius = (n > 0).then(|| (sum / f64::from(n)) as f32 * shrunk(painted));
@@ -115,18 +116,25 @@ fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
             Some(ColorBy::Power) => "by power",
             Some(ColorBy::Bounce) => "by bounce",
         };
-        egui::ComboBox::from_id_salt("photons")
-            .selected_text(name(painting.photons))
-            .show_ui(ui, |ui| {
-                for photons in [None, Some(ColorBy::Power), Some(ColorBy::Bounce)] {
-                    ui.selectable_value(&mut painting.photons, photons, name(photons));
-                }
-            })
-            .response
-            .on_hover_text(
-                "Photons of the last iteration as points over the picture. Does not restart the estimate. (G)",
-            )
-            .labelled_by(label.id);
+        ui.horizontal(|ui| {
+            egui::ComboBox::from_id_salt("photons")
+                .selected_text(name(painting.photons))
+                .show_ui(ui, |ui| {
+                    for photons in [None, Some(ColorBy::Power), Some(ColorBy::Bounce)] {
+                        ui.selectable_value(&mut painting.photons, photons, name(photons));
+                    }
+                })
+                .response
+                .on_hover_text(
+                    "Photons of the last iteration as points over the picture. Does not restart the estimate. (G)",
+                )
+                .labelled_by(label.id);
+            let hidden = egui::Checkbox::new(&mut painting.hidden_photons, "hidden too");
+            ui.add_enabled(painting.photons.is_some(), hidden).on_hover_text(
+                "Also those behind glass, under water or behind a wall, drawn where they are. Otherwise only those on \
+                 what is seen first.",
+            );
+        });
         ui.end_row();
         ui.label("Zoom");
         ui.horizontal(|ui| {
@@ -178,7 +186,7 @@ fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
             }
             ColorBy::Bounce => bounces(ui),
         }
-        ui.weak(format!("{} photons", insides.photons.len()));
+        ui.weak(format!("{} photons stored", insides.photons.len()));
     }
 }
 
@@ -285,9 +293,10 @@ fn cursor(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
             gathered,
             "Gathered by an iteration, on average; a view or photons that need them must be on",
         );
-        let radius = film
-            .filter(|_| hit.is_some())
-            .and_then(|(painted, i, ..)| Some(painted.frame.first_radii.get(i)? * shrunk(painted)));
+        let radius = film.and_then(|(painted, i, ..)| {
+            let FirstRadii { each, gathers } = &*painted.frame.first_radii;
+            gathers.get(i)?.then(|| each[i] * shrunk(painted))
+        });
         row(ui, "Radius", radius.map(length), "Of the estimate, now");
         let variance = film.and_then(|(painted, _, _, m2)| variance(m2, painted.frame.film.n_iterations));
         row(ui, "Variance", variance.map(short), "Of the mean luminance, estimated");

@@ -139,6 +139,8 @@ pub struct Painting {
     pub comparison: Comparison,
     /// Photons drawn over the picture.
     pub photons: Option<inspect::ColorBy>,
+    /// Those that something hides too: behind glass, in the next room.
+    pub hidden_photons: bool,
 }
 
 impl Painting {
@@ -284,7 +286,7 @@ impl Painter {
             None => self.view(frame, picture, painting, exposure),
         };
         if let (Some(color), Some(insides)) = (painting.photons, &frame.insides) {
-            let style = inspect::Style { color, ..Default::default() };
+            let style = inspect::Style { color, through: painting.hidden_photons, ..Default::default() };
             let dots = inspect::draw(&insides.photons, self.hits(frame), &style);
             for (to, from) in colours.rgba.chunks_exact_mut(4).zip(&dots) {
                 if from[3] > 0 {
@@ -354,7 +356,8 @@ impl Painter {
             }
             View::Radius => {
                 let scale = frame.radius / frame.first_radius.max(f32::MIN_POSITIVE);
-                scalar(frame.first_radii.iter().map(|r| r * scale).collect(), true)
+                let radii = frame.first_radii.each.iter().zip(&frame.first_radii.gathers);
+                scalar(radii.map(|(r, &gathers)| if gathers { r * scale } else { 0.0 }).collect(), true)
             }
             // One iteration has none.
             View::Variance if frame.film.n_iterations < 2 => as_picture(picture.rgb),

@@ -7,7 +7,7 @@ use anyhow::Result;
 use sunfleck::inspect::{self, Split};
 use sunfleck::layout::Camera;
 use sunfleck::output::Picture;
-use sunfleck::ppm::{self, Error, Film, Interrupt, Params, Stages};
+use sunfleck::ppm::{self, Error, Film, FirstRadii, Interrupt, Params, Stages};
 use sunfleck::scene::PackedScene;
 use sunfleck::scene::settings::Settings;
 
@@ -39,8 +39,7 @@ pub struct Frame {
     pub opened: Arc<Opened>,
     pub settings: Arc<Settings>,
     pub machine: Arc<Machine>,
-    /// `[h·w]`, metres.
-    pub first_radii: Arc<Vec<f32>>,
+    pub first_radii: Arc<FirstRadii>,
     /// Read back only where something shown needs it.
     pub insides: Option<Arc<Insides>>,
     /// Median of the first radii and of those now, metres.
@@ -93,7 +92,7 @@ pub struct Session {
     params: Params,
     is_preview: bool,
     /// None before the pilot.
-    radii: Option<Arc<Vec<f32>>>,
+    radii: Option<Arc<FirstRadii>>,
     split: Split,
     first_radius: f32,
     /// Done in this estimate.
@@ -170,11 +169,8 @@ impl Session {
         Ok(())
     }
 
-    fn set_radii(&mut self, radii: Vec<f32>) {
-        let mut usable: Vec<f32> = radii.iter().copied().filter(|r| *r > 0.0 && r.is_finite()).collect();
-        let middle = usable.len() / 2;
-        self.first_radius =
-            if usable.is_empty() { 0.0 } else { *usable.select_nth_unstable_by(middle, f32::total_cmp).1 };
+    fn set_radii(&mut self, radii: FirstRadii) {
+        [_, self.first_radius, _] = radii.spread();
         self.radii = Some(Arc::new(radii));
     }
 
@@ -253,7 +249,7 @@ impl Session {
     fn insides(&mut self) -> Result<Insides, Error> {
         let frame = self.params.frame(self.n_iterations);
         let (vertices, photons) = (self.stages.eye_vertices()?, self.stages.photons()?);
-        let radii = self.radii.as_deref().map_or(&[][..], Vec::as_slice);
+        let radii = self.radii.as_deref().map_or(&[][..], |radii| &radii.each);
         let iteration = inspect::Iteration::new(&self.scene, &frame, &vertices, radii, &photons);
         self.split.add(&iteration.split());
         let nodes_visited = iteration.nodes_visited();

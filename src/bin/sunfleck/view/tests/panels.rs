@@ -338,8 +338,12 @@ fn every_view_and_comparison_is_painted() {
     for _ in 0..2 {
         window.viewer().next_photons();
         painted(&mut window, "photons");
-        assert!(window.shows(" photons"));
+        assert!(window.shows(" photons stored"));
     }
+    let few = window.viewer().picture.painted().unwrap().rgba.clone();
+    window.activate("hidden too");
+    painted(&mut window, "hidden photons");
+    assert!(few != window.viewer().picture.painted().unwrap().rgba);
     window.viewer().next_photons();
     window.activate("Pin");
     window.wait("reference", |viewer| viewer.now.reference.is_some());
