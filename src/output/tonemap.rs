@@ -3,37 +3,9 @@
 //! All functions take and give linear RGB with the sRGB primaries (ITU-R BT.709, D65 white).
 
 use crate::ppm::film::luminance;
-
-/// How radiance above what a display can show is brought down.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ToneMap {
-    /// Khronos PBR Neutral (2024): colours below 0.76 stay as they are, highlights are compressed and desaturated.
-    #[default]
-    Neutral,
-    /// AgX (Troy Sobotka, 2022): film-like; bright saturated colours fade to white.
-    Agx,
-    /// None: values above 1 are cut off.
-    Srgb,
-}
+pub use crate::scene::settings::ToneMap;
 
 impl ToneMap {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Neutral, Self::Agx, Self::Srgb];
-
-    /// As the command line has it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Neutral => "neutral",
-            Self::Agx => "agx",
-            Self::Srgb => "srgb",
-        }
-    }
-
-    /// The inverse of [`ToneMap::name`].
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|tonemap| tonemap.name() == name)
-    }
-
     /// Exposed radiance to display-linear RGB in [0, 1]. NaN and negative values count as 0.
     pub fn apply(self, rgb: [f32; 3]) -> [f32; 3] {
         let rgb = rgb.map(|c| if c > 0.0 { c.min(1e9) } else { 0.0 });

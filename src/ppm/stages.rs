@@ -21,6 +21,16 @@ pub struct StageTimes {
     pub accumulate: f64,
 }
 
+impl std::ops::AddAssign for StageTimes {
+    fn add_assign(&mut self, other: Self) {
+        self.eye += other.eye;
+        self.photons += other.photons;
+        self.build += other.build;
+        self.gather += other.gather;
+        self.accumulate += other.accumulate;
+    }
+}
+
 impl StageTimes {
     /// Of the whole iteration.
     pub fn total(&self) -> f64 {

@@ -35,7 +35,7 @@ mod values;
 pub use changes::{MaterialSettings, SceneLightSettings};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-pub use values::{Count, Direct, FirstRadius, Index, Kernel, LightKind, Size, parse_count};
+pub use values::{Count, Direct, FirstRadius, Index, Kernel, LightKind, Size, ToneMap, parse_count};
 
 use super::load::LoadError;
 use super::{Accelerator, Environment};
@@ -91,6 +91,9 @@ pub struct Settings {
     /// Stops (powers of two) that the picture is brightened by for display.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exposure: Option<f32>,
+    /// Tone curve for display: `"neutral"`, the default, `"agx"` or `"srgb"`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tonemap: Option<ToneMap>,
     /// Longest path from lamp to lens, segments.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_segments: Option<u32>,

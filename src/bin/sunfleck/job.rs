@@ -81,7 +81,10 @@ impl Job {
         Ok(Self {
             scene_name,
             outputs: args.output.clone(),
-            look: Look { exposure: args.exposure.or(settings.exposure), tonemap: args.tonemap.unwrap_or_default() },
+            look: Look {
+                exposure: args.exposure.or(settings.exposure),
+                tonemap: args.tonemap.or(settings.tonemap).unwrap_or_default(),
+            },
             budget,
             one_radius: args.input.paper && radius == FirstRadius::Automatic,
             source,

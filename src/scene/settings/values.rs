@@ -61,6 +61,38 @@ impl fmt::Display for Index {
     }
 }
 
+/// How radiance above what a display can show is brought down.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ToneMap {
+    /// Khronos PBR Neutral (2024): colours below 0.76 stay as they are, highlights are compressed and desaturated.
+    #[default]
+    Neutral,
+    /// AgX (Troy Sobotka, 2022): film-like; bright saturated colours fade to white.
+    Agx,
+    /// None: values above 1 are cut off.
+    Srgb,
+}
+
+impl ToneMap {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Neutral, Self::Agx, Self::Srgb];
+
+    /// As the command line has it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Neutral => "neutral",
+            Self::Agx => "agx",
+            Self::Srgb => "srgb",
+        }
+    }
+
+    /// The inverse of [`ToneMap::name`].
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|tonemap| tonemap.name() == name)
+    }
+}
+
 /// The kinds of lights without extent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]

@@ -6,11 +6,15 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
 use eframe::egui;
+use egui::Color32;
+use sunfleck::output::display::Look;
 use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::Camera;
 use sunfleck::scene::settings::Settings;
 
-use super::engine::{Choice, Engine, Limits, Message, Now, Opened, Phase, Save, Wake, Wanted, is_same};
+use super::engine::{
+    Choice, Engine, Limits, Message, Now, Opened, Phase, Save, Wake, Wanted, is_asked_anew, is_other_scene, is_same,
+};
 use super::files;
 use super::messages::Messages;
 use super::picture::PictureView;
@@ -60,6 +64,21 @@ impl First {
     }
 }
 
+/// Text that egui draws too faintly, with a contrast of 4.5 and more to the panel (WCAG 2.2, 1.4.3).
+fn make_legible(ctx: &egui::Context) {
+    for (theme, weak, warning) in [
+        (egui::Theme::Dark, Color32::from_gray(140), None),
+        (egui::Theme::Light, Color32::from_gray(100), Some(Color32::from_rgb(170, 80, 0))),
+    ] {
+        if ctx.style_of(theme).visuals.weak_text_color.is_none() {
+            ctx.style_mut_of(theme, |style| {
+                style.visuals.weak_text_color = Some(weak);
+                style.visuals.warn_fg_color = warning.unwrap_or(style.visuals.warn_fg_color);
+            });
+        }
+    }
+}
+
 /// See [`Viewer::last_save`].
 pub type LastSave = Arc<Mutex<Option<Save>>>;
 
@@ -71,6 +90,8 @@ pub struct Viewer {
     /// What there is; taken from the engine before every frame.
     pub now: Now,
     pub edits: Edits,
+    /// Whether what is being read is what was open, to be edited on.
+    keeps_edits: bool,
     pub remembered: Remembered,
     /// Whether it has been in a window.
     entered: bool,
@@ -79,8 +100,7 @@ pub struct Viewer {
     pub compare: super::compare::CompareView,
     /// Index into the scene's materials.
     pub selected: Option<usize>,
-    /// Where saving goes without asking, and where the picture of which scene was saved last.
-    pub output: Option<PathBuf>,
+    /// Where the picture of which scene goes without asking; of the first that is opened, if none is named.
     pub saved_as: Option<(Option<Arc<Choice>>, PathBuf)>,
     last_save: LastSave,
     pub convergence: super::convergence::Convergence,
@@ -95,6 +115,11 @@ pub struct Viewer {
     title: String,
     pub messages: Messages,
     pub show_help: bool,
+    pub held: super::keys::Held,
+    /// Whether a field had the keys in the frame before.
+    pub was_typing: bool,
+    /// Whether a field was left by Escape in the frame before.
+    pub escaped: bool,
     pub dialog: Option<files::Dialog>,
     /// To be read.
     reference: Option<PathBuf>,
@@ -109,18 +134,19 @@ impl Viewer {
     pub fn new(engine: Engine, wake: Wake, first: First) -> Self {
         let now = engine.now();
         let wanted = Wanted { scene: first.choice.map(Arc::new), limits: first.limits, ..Wanted::default() };
+        let saved_as = first.output.map(|path| (wanted.scene.clone(), path));
         Self {
             engine,
             wanted,
             now,
             edits: Edits::default(),
+            keeps_edits: false,
             remembered: Remembered::default(),
             entered: false,
             picture: PictureView::default(),
             inspect: Default::default(),
             compare: Default::default(),
-            output: first.output,
-            saved_as: None,
+            saved_as,
             last_save: LastSave::default(),
             convergence: Default::default(),
             timing: Default::default(),
@@ -130,6 +156,9 @@ impl Viewer {
             title: String::new(),
             messages: Messages::default(),
             show_help: false,
+            held: Default::default(),
+            was_typing: false,
+            escaped: false,
             dialog: None,
             reference: first.reference,
             pick: Arc::new(files::pick),
@@ -145,7 +174,6 @@ impl Viewer {
     pub fn enter(&mut self, storage: Option<&dyn eframe::Storage>) {
         if !std::mem::replace(&mut self.entered, true) {
             self.remembered = storage.and_then(|storage| eframe::get_value(storage, REMEMBERED)).unwrap_or_default();
-            self.wanted.painting.look.tonemap = self.remembered.tone();
             return;
         }
         self.picture.forget();
@@ -156,8 +184,7 @@ impl Viewer {
 
     /// Keeps what is to be remembered.
     pub fn save(&self, storage: &mut dyn eframe::Storage) {
-        let tone = self.wanted.painting.look.tonemap.name().to_owned();
-        eframe::set_value(storage, REMEMBERED, &Remembered { tone, ..self.remembered.clone() });
+        eframe::set_value(storage, REMEMBERED, &self.remembered);
     }
 
     /// Opens a file, or a shipped scene by its name.
@@ -166,14 +193,17 @@ impl Viewer {
             self.previous = self.wanted.scene.clone();
         }
         self.wanted.scene = Some(Arc::new(Choice { name: name.into(), set: self.always.clone() }));
-        self.wanted.settings = None;
+        if let Some((scene @ None, _)) = &mut self.saved_as {
+            scene.clone_from(&self.wanted.scene);
+        }
+        (self.wanted.settings, self.keeps_edits) = (None, false);
         self.wanted.reloads += 1;
     }
 
     /// Opens what was open before.
     pub fn back(&mut self) {
         self.wanted.scene = self.previous.take();
-        self.wanted.settings = None;
+        (self.wanted.settings, self.keeps_edits) = (None, false);
         self.wanted.reloads += 1;
     }
 
@@ -186,8 +216,9 @@ impl Viewer {
         (self.wanted.scene, self.wanted.settings) = (None, None);
     }
 
-    /// Reads the scene's file again; settings stay.
+    /// Reads the scene's file again; what was changed stays changed.
     pub fn reload(&mut self) {
+        self.keeps_edits = true;
         self.wanted.reloads += 1;
     }
 
@@ -232,13 +263,24 @@ impl Viewer {
     }
 
     /// Brightens the picture by so many stops.
-    pub fn expose(&mut self, stops: f32) {
-        let now = self.wanted.painting.look.exposure.or(self.now.painted.as_ref().map(|painted| painted.exposure));
-        self.wanted.painting.look.exposure = Some(now.unwrap_or(0.0) + stops);
+    pub fn expose(&mut self, ui: &egui::Ui, stops: f32) {
+        let now = self.look().exposure.or(self.now.painted.as_ref().map(|painted| painted.exposure));
+        self.show_otherwise(ui, "exposure", |s| s.exposure = Some(now.unwrap_or(0.0) + stops));
+    }
+
+    /// Changes settings that only say how the picture is shown: nothing is rendered for it.
+    pub fn show_otherwise(&mut self, ui: &egui::Ui, what: &'static str, change: impl FnOnce(&mut Settings)) {
+        self.edit_at(ui.input(|i| i.time), what, change);
+    }
+
+    /// How the picture is shown.
+    pub fn look(&self) -> Look {
+        let settings = self.edits.now();
+        Look { exposure: settings.exposure, tonemap: settings.tonemap.unwrap_or_default() }
     }
 
     /// In a narrow window it gives way to the settings, so that the picture does not.
-    fn shows_inspect(&self, width: f32) -> bool {
+    pub fn shows_inspect(&self, width: f32) -> bool {
         self.remembered.show_inspect && (!self.remembered.show_settings || width >= LEAST_FOR_BOTH)
     }
 
@@ -248,13 +290,13 @@ impl Viewer {
         self.remembered.show_settings &= !self.remembered.show_inspect || width >= LEAST_FOR_BOTH;
     }
 
-    pub fn next_tone(&mut self) {
-        let tonemap = &mut self.wanted.painting.look.tonemap;
-        *tonemap = match tonemap {
+    pub fn next_tone(&mut self, ui: &egui::Ui) {
+        let next = match self.look().tonemap {
             ToneMap::Neutral => ToneMap::Agx,
             ToneMap::Agx => ToneMap::Srgb,
             ToneMap::Srgb => ToneMap::Neutral,
         };
+        self.show_otherwise(ui, "tone curve", |s| s.tonemap = Some(next));
     }
 
     /// One iteration, then a pause.
@@ -272,9 +314,7 @@ impl Viewer {
 
     /// The settings as a file holds them.
     pub fn settings_text(&self) -> Option<String> {
-        let mut settings = self.editing.as_ref()?.source.rooted(self.edits.now());
-        settings.exposure = self.wanted.painting.look.exposure;
-        Some(settings.to_toml())
+        Some(self.editing.as_ref()?.source.rooted(self.edits.now()).to_toml())
     }
 
     /// What renders this picture on the command line.
@@ -301,8 +341,7 @@ impl Viewer {
 
     /// The picture as it looks now, to be written to `path`.
     pub fn saving_to(&self, path: PathBuf) -> Save {
-        let (look, scene) = (self.wanted.painting.look, self.wanted.scene.clone());
-        Save { path, look, scene }
+        Save { path, look: self.look(), scene: self.wanted.scene.clone() }
     }
 
     /// How the picture would be saved now; with an empty path if nobody has said where. Kept right at every frame.
@@ -312,8 +351,28 @@ impl Viewer {
 
     /// Where saving goes without asking.
     pub fn place(&self) -> Option<&PathBuf> {
-        let saved_as = self.saved_as.as_ref().filter(|(scene, _)| *scene == self.wanted.scene);
-        saved_as.map(|(_, path)| path).or(self.output.as_ref())
+        self.saved_as.as_ref().filter(|(scene, _)| *scene == self.wanted.scene).map(|(_, path)| path)
+    }
+
+    /// Applies what was changed since the file said `before` to what it says `now`, and so in every step of undo.
+    fn keep_edits(&mut self, before: &Settings, now: &Settings) {
+        if before == now {
+            return;
+        }
+        let mut lost = None;
+        self.edits.map(|settings| {
+            let mut rebased = now.clone();
+            for pair in settings.difference(before) {
+                if let Err(error) = rebased.set(&pair) {
+                    lost = Some(format!("{pair}: {error}"));
+                }
+            }
+            rebased
+        });
+        if let Some(what) = lost {
+            self.messages.say(0.0, Message::Warning(format!("cannot be kept with what the file says now: {what}")));
+        }
+        self.wanted.settings = Some(Arc::clone(self.edits.now()));
     }
 
     /// Shows a message.
@@ -341,8 +400,11 @@ impl Viewer {
             self.timing.frame(took);
         }
         let began = Instant::now();
+        make_legible(ui.ctx());
         self.look_at_engine(ui);
         let wanted = self.wanted.clone();
+        // What is done with a button held is one step, however long it rests.
+        ui.input(|i| self.edits.pointer(i.time, i.pointer.any_pressed(), i.pointer.any_down()));
         files::poll(ui, self);
         if let Some(path) = self.reference.take() {
             super::compare::load(ui, self, &path);
@@ -378,8 +440,10 @@ impl Viewer {
         }
         super::help::show(ui, self);
         self.messages.show(ui);
-        let asks = |w: &Wanted| (w.settings.clone(), w.scene.clone(), w.restarts);
-        if asks(&wanted) != asks(&self.wanted) {
+        self.wanted.painting.look = self.look();
+        if is_other_scene(&wanted, &self.wanted)
+            || self.editing.as_ref().is_some_and(|opened| is_asked_anew(opened, &wanted, &self.wanted))
+        {
             self.timing.ask(began, self.now.estimate);
         }
         self.engine.want(&self.wanted);
@@ -406,15 +470,16 @@ impl Viewer {
         self.engine.take_messages().into_iter().for_each(|message| self.messages.say(time, message));
         if !is_same(self.editing.as_ref(), self.now.opened.as_ref()) {
             self.selected = None;
-            let is_reload = self.wanted.settings.is_some() && self.now.opened.is_some();
-            self.editing = self.now.opened.clone();
+            let before = std::mem::replace(&mut self.editing, self.now.opened.clone());
             self.picture.forget();
-            if let Some(opened) = &self.editing {
+            if let Some(opened) = self.editing.clone() {
                 self.remembered.opened(&opened.source.name);
-                if !is_reload {
-                    self.edits = Edits::new(opened.source.settings.clone());
-                    self.wanted.painting.look.exposure = opened.source.settings.exposure;
-                    self.picture = PictureView::default();
+                match before.filter(|before| self.keeps_edits && before.choice == opened.choice) {
+                    Some(before) => self.keep_edits(&before.source.settings, &opened.source.settings),
+                    None => {
+                        self.edits = Edits::new(opened.source.settings.clone());
+                        self.picture = PictureView::default();
+                    }
                 }
             }
         }

@@ -38,7 +38,11 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
                 if ui.button("Open reference …").on_hover_text("An .exr to compare with").clicked() {
                     files::ask_reference(viewer);
                 }
-                if ui.button("Read scene again").on_hover_text("Settings stay (Ctrl+R)").clicked() {
+                if ui
+                    .button("Read scene again")
+                    .on_hover_text("What was changed in the window stays (Ctrl+R)")
+                    .clicked()
+                {
                     viewer.reload();
                 }
                 if ui.button("Close scene").on_hover_text("Back to the start page (Ctrl+W)").clicked() {
@@ -61,11 +65,14 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
             }
         });
         ui.menu_button("Window", |ui| {
-            let remembered = &mut viewer.remembered;
-            ui.checkbox(&mut remembered.show_settings, "Settings").on_hover_text("F1");
-            ui.checkbox(&mut remembered.show_inspect, "Inspect")
-                .on_hover_text("F2; where there is room beside the settings");
-            ui.checkbox(&mut remembered.show_convergence, "Convergence").on_hover_text("F3");
+            let width = ui.ctx().content_rect().width();
+            let mut shows_inspect = viewer.shows_inspect(width);
+            ui.checkbox(&mut viewer.remembered.show_settings, "Settings").on_hover_text("F1");
+            let inspect = ui.checkbox(&mut shows_inspect, "Inspect");
+            if inspect.on_hover_text("F2; in a narrow window in the place of the settings").changed() {
+                viewer.toggle_inspect(width);
+            }
+            ui.checkbox(&mut viewer.remembered.show_convergence, "Convergence").on_hover_text("F3");
             ui.separator();
             let theme = ui.ctx().options(|options| options.theme_preference);
             for (preference, name) in [
@@ -91,7 +98,7 @@ fn run(ui: &mut egui::Ui, viewer: &mut Viewer) {
     let paused = viewer.wanted.paused;
     let (name, help) = match paused {
         true => ("Resume", "Go on (P)"),
-        false => ("Pause", "After the stage under way; nothing is lost (P)"),
+        false => ("Pause", "After the iteration under way; nothing is lost (P)"),
     };
     if ui.add(Button::new(name).selected(paused)).on_hover_text(help).clicked() {
         viewer.wanted.paused = !paused;
@@ -135,7 +142,13 @@ fn limits(ui: &mut egui::Ui, limits: &mut Limits) {
     let speed = 0.01 * numbers.noise;
     let e = DragValue::new(&mut numbers.noise).range(1e-9..=1.0).speed(speed).prefix("noise ");
     let e = e.custom_formatter(|noise, _| format!("{noise:.1e}"));
-    let noise = limit(ui, is_on[2], "noise", "Stop when the estimated relMSE is as low as this", e);
+    let noise = limit(
+        ui,
+        is_on[2],
+        "noise",
+        "Stop when the estimated relMSE is as low as this. In it a single bright pixel (a firefly) counts little, and the blur of the radius nothing.",
+        e,
+    );
     limits.iterations = iterations.then_some(numbers.iterations);
     limits.seconds = seconds.then_some(numbers.seconds);
     limits.noise = noise.then_some(numbers.noise);
@@ -201,7 +214,7 @@ pub fn status(ui: &mut egui::Ui, viewer: &Viewer) {
             Phase::Loading => "Reading",
             Phase::Preparing => "Preparing",
             Phase::Starting => "First photons",
-            Phase::Rendering if viewer.wanted.paused => "Last iteration before the pause",
+            Phase::Rendering if viewer.wanted.paused => "To the end of an iteration, then paused",
             Phase::Rendering => "Rendering",
             Phase::Paused => "Paused",
             Phase::Reached => "Limit reached",

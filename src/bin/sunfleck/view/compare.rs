@@ -14,6 +14,7 @@ use super::charts::short;
 use super::engine::{Comparison, Message, Painted, Reference, View, is_same};
 use super::files;
 use super::inspect::{row, table};
+use super::keys::Held;
 
 /// Half the width of what the line of the wipe is held by, points.
 const HOLD: f32 = 6.0;
@@ -200,16 +201,16 @@ pub fn section(ui: &mut egui::Ui, viewer: &mut Viewer) {
     });
 }
 
-/// Over the picture at `rect`.
-pub fn overlay(ui: &egui::Ui, viewer: &mut Viewer, painter: &egui::Painter, rect: Rect) {
-    let Some(painted) = viewer.picture.painted().cloned() else { return };
-    let Some((reference, _)) = &painted.reference else { return };
-    let Some((size, rgba)) = painted.reference_texture() else { return };
+/// Over the picture at `rect`; right of which place, points, the reference is seen.
+pub fn overlay(ui: &egui::Ui, viewer: &mut Viewer, painter: &egui::Painter, rect: Rect) -> Option<f32> {
+    let painted = viewer.picture.painted().cloned()?;
+    let (reference, _) = painted.reference.as_ref()?;
+    let (size, rgba) = painted.reference_texture()?;
     let visible = rect.intersect(painter.clip_rect());
-    let is_held = is_asked_for(ui, visible);
+    let is_held = is_asked_for(ui, &viewer.held, visible);
     let is_wiped = painted.painting.comparison == Comparison::Wipe;
     if !(is_held || is_wiped) || !visible.is_positive() {
-        return;
+        return None;
     }
     let view = &mut viewer.compare;
     let made = Made::of(&painted, reference);
@@ -218,11 +219,11 @@ pub fn overlay(ui: &egui::Ui, viewer: &mut Viewer, painter: &egui::Painter, rect
         let options = egui::TextureOptions { magnification: egui::TextureFilter::Nearest, ..Default::default() };
         view.texture = Some((made, ui.ctx().load_texture("reference", image, options)));
     }
-    let Some((_, texture)) = &view.texture else { return };
+    let (_, texture) = view.texture.as_ref()?;
     if is_held {
         painter.image(texture.id(), rect, uv(0.0), Color32::WHITE);
         name(painter, visible.left_top(), egui::Align2::LEFT_TOP, &reference.name);
-        return;
+        return Some(f32::NEG_INFINITY);
     }
     let (x, from) = line(view.wipe, rect, visible);
     let hold = Rect::from_x_y_ranges(x - HOLD..=x + HOLD, visible.y_range());
@@ -243,16 +244,17 @@ pub fn overlay(ui: &egui::Ui, viewer: &mut Viewer, painter: &egui::Painter, rect
         view.wipe = ((pointer.x - rect.left()) / rect.width()).clamp(0.0, 1.0);
         ui.ctx().request_repaint();
     }
+    Some(x)
 }
 
 /// Whether the reference is to be seen in the place of the picture: Shift, and nothing else.
-fn is_asked_for(ui: &egui::Ui, visible: Rect) -> bool {
+fn is_asked_for(ui: &egui::Ui, held: &Held, visible: Rect) -> bool {
     if ui.ctx().egui_wants_keyboard_input() {
         return false;
     }
     ui.input(|i| {
         i.modifiers.shift_only()
-            && i.keys_down.iter().all(|key| matches!(key, Key::ShiftLeft | Key::ShiftRight))
+            && held.only(&[Key::ShiftLeft, Key::ShiftRight])
             && !i.pointer.any_down()
             && i.pointer.latest_pos().is_some_and(|p| visible.contains(p))
     })

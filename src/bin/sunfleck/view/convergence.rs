@@ -15,6 +15,8 @@ use crate::progress;
 
 /// Points a line, at most.
 const MOST_POINTS: usize = 500;
+/// The same where a point is the mean over the iterations since the one before it: the clock's noise is not to fill the plot.
+const MOST_MEANS: usize = 100;
 /// Width below which fewer plots stand side by side, points.
 const LEAST_WIDTH: f32 = 210.0;
 
@@ -44,8 +46,9 @@ impl Kind {
     fn describe(self) -> &'static str {
         match self {
             Self::Error => {
-                "relMSE: noise as estimated from the two halves of the iterations, which do not see the blur of the \
-                 radius; against the reference, if there is one; and the slopes of the theory (Knaus & Zwicker 2011)"
+                "relMSE: noise as estimated from the two halves of the iterations, in which a single bright pixel (a \
+                 firefly) counts little and the blur of the radius nothing; against the reference, if there is one, \
+                 where one such pixel may rule; and the slopes of the theory (Knaus & Zwicker 2011)"
             }
             Self::Radius => "median radius of the estimate",
             Self::Rate => "photon paths that leave the lamps, and photons that are stored, a second",
@@ -115,6 +118,8 @@ struct Curve {
 /// Points of the history, few enough to draw.
 struct Sample {
     records: Vec<Record>,
+    /// Fewer of them.
+    means: Vec<Record>,
     estimated: Vec<Measured>,
     against_reference: Vec<Measured>,
 }
@@ -123,6 +128,7 @@ impl Sample {
     fn of(history: &History) -> Self {
         Self {
             records: history.records.sample(MOST_POINTS),
+            means: history.records.sample(MOST_MEANS),
             estimated: history.estimated.sample(MOST_POINTS),
             against_reference: history.against_reference.sample(MOST_POINTS),
         }
@@ -152,6 +158,8 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
     let shown = &shown[..shown.len().min(room)];
     if shown.is_empty() || key.0.is_none() {
         ui.weak(if shown.is_empty() { "No plot is chosen." } else { "Nothing to plot before the first iteration." });
+        // Or the panel would shrink at every restart.
+        ui.allocate_space(ui.available_size());
         return;
     }
     ui.columns(shown.len(), |columns| {
@@ -243,7 +251,7 @@ fn plot(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &Hidden, by_sec
         Some(format!("{line}{}\n{x}", kind.value(position.y)))
     };
     let group = egui::Id::unique("convergence cursor");
-    let mut plot = Plot::new(("convergence", kind.name()))
+    let mut plot = Plot::new(("convergence", kind.name(), by_seconds))
         .height(ui.available_height().max(40.0))
         .allow_scroll(false)
         .allow_boxed_zoom(false)
@@ -275,6 +283,16 @@ fn plot(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &Hidden, by_sec
     });
 }
 
+/// Before the first iteration.
+static FIRST: Record = Record {
+    iteration: 0,
+    seconds: 0.0,
+    radius: 0.0,
+    times: StageTimes { eye: 0.0, photons: 0.0, build: 0.0, gather: 0.0, accumulate: 0.0 },
+    n_photons: 0,
+    n_paths: 0,
+};
+
 /// The lines of a plot.
 fn curves(kind: Kind, sample: &Sample, alpha: f64, by_seconds: bool) -> Vec<Curve> {
     let at = |iteration: u32, seconds: f64| if by_seconds { seconds } else { f64::from(iteration) }.log10();
@@ -283,6 +301,12 @@ fn curves(kind: Kind, sample: &Sample, alpha: f64, by_seconds: bool) -> Vec<Curv
     let records = &sample.records;
     let of_records = |name: &str, value: &dyn Fn(&Record) -> f64| {
         solid(name, records.iter().map(|r| [at(r.iteration, r.seconds), value(r)]).collect())
+    };
+    // Over what passed since the point before.
+    let of_means = |name: &str, value: &dyn Fn(&Record, &Record) -> f64| {
+        let before = std::iter::once(&FIRST).chain(&sample.means);
+        let points = before.zip(&sample.means).map(|(before, r)| [at(r.iteration, r.seconds), value(before, r)]);
+        solid(name, points.collect())
     };
     match kind {
         Kind::Error => {
@@ -304,12 +328,10 @@ fn curves(kind: Kind, sample: &Sample, alpha: f64, by_seconds: bool) -> Vec<Curv
         Kind::Radius => vec![of_records("radius", &|r| f64::from(r.radius).log10())],
         Kind::Rate => {
             let rate = |name: &str, photons: fn(&Record) -> u32| {
-                let before = std::iter::once(Record::default()).chain(records.iter().copied());
-                let points = before.zip(records).map(|(before, r)| {
+                of_means(name, &|before, r| {
                     let n = f64::from(r.iteration - before.iteration) * f64::from(photons(r));
-                    [at(r.iteration, r.seconds), (n / (r.seconds - before.seconds)).log10()]
-                });
-                solid(name, points.collect())
+                    (n / (r.seconds - before.seconds)).log10()
+                })
             };
             vec![rate("emitted", |r| r.n_paths), rate("stored", |r| r.n_photons)]
         }
@@ -322,7 +344,12 @@ fn curves(kind: Kind, sample: &Sample, alpha: f64, by_seconds: bool) -> Vec<Curv
                 ("gather", |t| t.gather),
                 ("accumulate", |t| t.accumulate),
             ];
-            stages.iter().map(|(name, stage)| of_records(name, &|r| 1e3 * stage(&r.times))).collect()
+            let mean = |stage: Stage| {
+                of_means(stage.0, &|before, r| {
+                    1e3 * (stage.1(&r.times) - stage.1(&before.times)) / f64::from(r.iteration - before.iteration)
+                })
+            };
+            stages.into_iter().map(mean).collect()
         }
     }
 }
@@ -360,12 +387,12 @@ fn log_marks(input: GridInput) -> Vec<GridMark> {
         .collect()
 }
 
-/// Decades always; 2 and 5 where few decades are seen.
+/// Decades always; 2 and 5 where few decades are seen, all digits within one.
 fn is_labelled(mark: f64, range: &RangeInclusive<f64>) -> bool {
     let digit = 10f64.powf(mark - mark.floor());
     let is = |n: f64| (digit - n).abs() < 1e-6;
     let decades = range.end() - range.start();
-    is(1.0) || is(10.0) || decades < 1.6 && (is(2.0) || is(5.0))
+    is(1.0) || is(10.0) || decades < 2.5 && (is(2.0) || is(5.0)) || decades < 0.8
 }
 
 /// "100", "20k", "3M".
@@ -391,7 +418,11 @@ mod tests {
             iteration,
             seconds: 0.5 * f64::from(iteration),
             radius: 0.01,
-            times: StageTimes { eye: 0.001, photons: 0.002, build: 0.003, gather: 0.004, accumulate: 0.005 },
+            times: {
+                let all = |each: f64| each * f64::from(iteration);
+                let [eye, photons, build, gather, accumulate] = [0.001, 0.002, 0.003, 0.004, 0.005].map(all);
+                StageTimes { eye, photons, build, gather, accumulate }
+            },
             n_photons: 3000,
             n_paths: 1000,
         };
@@ -402,6 +433,7 @@ mod tests {
         };
         Sample {
             records: [1, 2, 10, 100].map(record).to_vec(),
+            means: [1, 2, 10, 100].map(record).to_vec(),
             estimated: [10, 100].map(measured).to_vec(),
             against_reference: vec![],
         }
@@ -443,7 +475,7 @@ mod tests {
     #[test]
     fn what_has_no_logarithm_is_left_out() {
         let mut sample = sample();
-        sample.records[1].n_photons = 0;
+        sample.means[1].n_photons = 0;
         sample.estimated[0].rel_mse = 0.0;
         assert_eq!(curves(Kind::Rate, &sample, 0.5, false)[1].points.len(), 3);
         assert_eq!(curves(Kind::Error, &sample, 0.5, false)[0].points.len(), 1);
@@ -455,9 +487,11 @@ mod tests {
         let labels = |range: RangeInclusive<f64>| {
             marks.iter().filter(|m| is_labelled(m.value, &range)).map(|m| small_number(10f64.powf(m.value))).collect()
         };
-        let [wide, near]: [Vec<String>; 2] = [-0.2..=1.5, 0.0..=1.2].map(labels);
+        let [wide, near, one]: [Vec<String>; 3] = [-1.2..=1.5, 0.0..=1.2, 0.5..=0.9].map(labels);
         assert_eq!(wide, ["1", "10"]);
         assert_eq!(near, ["1", "2", "5", "10", "20"]);
+        // Of a range in which there may be no 1, 2 or 5, every digit; what lies outside of it is not drawn.
+        assert_eq!(one.len(), marks.len());
         assert!(log_marks(GridInput { bounds: (-1e9, 1e9), base_step_size: 1.0 }).is_empty());
         assert_eq!([1e3, 2e4, 5e6].map(count), ["1000", "20k", "5M"]);
         assert_eq!((Kind::Error.mark(-3.0), Kind::Radius.mark(-3.0)), ("1e-3".to_owned(), "1.00 mm".to_owned()));

@@ -15,7 +15,7 @@ use sunfleck::ppm::film::luminance;
 
 use super::app::Viewer;
 use super::charts::{bar, bars, bounces, rgb, rgba, short};
-use super::engine::{Comparison, Legend, Painted, Values, View};
+use super::engine::{Comparison, Legend, NOTHING, Painted, Values, View};
 use crate::progress::{decimals, length};
 
 /// Of what there is nothing to say about.
@@ -175,6 +175,12 @@ fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
             false => rgba(false_colour::colour(t)),
         };
         bar(ui, "Legend", legend.range, legend.log, unit, map);
+        if legend.log {
+            ui.horizontal(|ui| {
+                ui.label(RichText::new("■").color(rgba(NOTHING)));
+                ui.weak("0: nothing");
+            });
+        }
     }
     if let (Some(color_by), Some(insides)) = (painted.painting.photons, &painted.frame.insides) {
         match color_by {
@@ -250,6 +256,10 @@ fn cursor(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
         let radiance = film.map(|(_, _, rgb, _)| rgb);
         row(ui, "Radiance", radiance.map(three), "Red, green, blue: linear, W/(m² sr)");
         row(ui, "Luminance", radiance.map(|rgb| short(luminance(rgb))), "Weighted mean of the radiance");
+        if let Some((reference, _)) = painted.and_then(|painted| painted.reference.as_ref()) {
+            let rgb = film.and_then(|(_, i, ..)| reference.picture.rgb.get(i).copied());
+            row(ui, "Reference", rgb.map(three), "Radiance of the reference here");
+        }
         let exposed = film.map(|(painted, _, rgb, _)| rgb.map(|c| c * painted.exposure.exp2()));
         row(ui, "Exposed", exposed.map(three), "Radiance after exposure; 0.18 is mid grey");
         let shown = film.map(|(painted, _, rgb, _)| on_display(rgb, painted));

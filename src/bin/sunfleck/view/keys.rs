@@ -1,5 +1,7 @@
 //! Keyboard shortcuts: one table, from which the help is made.
 
+use std::collections::BTreeSet;
+
 use eframe::egui;
 use egui::{Key, KeyboardShortcut, Modifiers};
 use sunfleck::ppm::Params;
@@ -46,13 +48,13 @@ pub const SHORTCUTS: &[Shortcut] = &[
     command(Key::Q, "quit", |ui, _| ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close)),
     command(Key::Z, "undo", |_, v| v.undo()),
     command(Key::Y, "redo", |_, v| v.redo()),
-    shift(Key::E, "half a stop darker", |_, v| v.expose(-0.5)),
+    shift(Key::E, "half a stop darker", |ui, v| v.expose(ui, -0.5)),
     shift(Key::V, "view before", |_, v| v.next_view(-1)),
     key(Key::V, "next view", |_, v| v.next_view(1)),
     key(Key::G, "photons over the picture: by power, by bounce, none", |_, v| v.next_photons()),
-    key(Key::E, "half a stop brighter", |_, v| v.expose(0.5)),
-    key(Key::X, "automatic exposure", |_, v| v.wanted.painting.look.exposure = None),
-    key(Key::T, "next tone curve", |_, v| v.next_tone()),
+    key(Key::E, "half a stop brighter", |ui, v| v.expose(ui, 0.5)),
+    key(Key::X, "automatic exposure", |ui, v| v.show_otherwise(ui, "exposure", |s| s.exposure = None)),
+    key(Key::T, "next tone curve", |ui, v| v.next_tone(ui)),
     key(Key::C, "next comparison with the reference", |ui, v| v.next_comparison(ui)),
     key(Key::Space, "restart", |_, v| v.restart()),
     key(Key::P, "pause, go on", |_, v| v.wanted.paused = !v.wanted.paused),
@@ -81,26 +83,74 @@ fn scale_photons(ui: &egui::Ui, viewer: &mut Viewer, factor: f64) {
     });
 }
 
+/// Keys as they lie under the fingers. Of a sign that needs Shift egui never sees the end, if Shift is let go first: the
+/// key has another name then.
+#[derive(Default)]
+pub struct Held(BTreeSet<Key>);
+
+impl Held {
+    /// Takes an event in; whether it is more than the repetition of a press.
+    fn take(&mut self, event: &egui::Event) -> bool {
+        match event {
+            egui::Event::Key { key, physical_key, pressed: true, .. } => self.0.insert(physical_key.unwrap_or(*key)),
+            egui::Event::Key { key, physical_key, pressed: false, .. } => {
+                self.0.remove(&physical_key.unwrap_or(*key));
+                true
+            }
+            egui::Event::WindowFocused(false) => {
+                self.0.clear();
+                true
+            }
+            _ => true,
+        }
+    }
+
+    /// Whether nothing is but these.
+    pub fn only(&self, keys: &[Key]) -> bool {
+        self.0.iter().all(|key| keys.contains(key))
+    }
+}
+
 /// Does what was asked for by keys, unless they are typed into a field.
 pub fn handle(ui: &mut egui::Ui, viewer: &mut Viewer) {
-    let flying = ui.input(|i| i.pointer.secondary_down()) || viewer.picture.flying;
-    if ui.ctx().egui_wants_keyboard_input() || flying {
-        return;
-    }
+    let typing = ui.ctx().egui_wants_keyboard_input();
+    // What a field or a menu does with Escape comes first. egui has taken the field's focus by now.
+    let was_typing = std::mem::replace(&mut viewer.was_typing, typing);
+    let escaped = was_typing && !typing && ui.input(|i| i.key_pressed(Key::Escape));
+    // In the next frame, too: there a number field of egui 0.37 still counts as just left, and would take what was typed.
+    let escaped_before = std::mem::replace(&mut viewer.escaped, escaped);
+    let escapes = !was_typing && !escaped_before && !egui::Popup::is_any_open(ui.ctx());
     let modified = |event: &egui::Event| match event {
         egui::Event::Key { key, pressed: true, modifiers, .. } if modifiers.command || modifiers.alt => Some(*key),
         _ => None,
     };
-    ui.input(|i| viewer.picture.not_flying.extend(i.events.iter().filter_map(modified)));
-    // What a held key repeats is no other press of it, but for what is done with Ctrl, undo among it.
-    let is_repeated =
-        |event: &egui::Event| matches!(event, egui::Event::Key { repeat: true, modifiers, .. } if !modifiers.command);
-    ui.input_mut(|i| i.events.retain(|event| !is_repeated(event)));
+    if !typing && !viewer.picture.flying {
+        ui.input(|i| viewer.picture.not_flying.extend(i.events.iter().filter_map(modified)));
+    }
+    // In a field, and with Ctrl, undo among it, a held key does again what it does.
+    let again =
+        |event: &egui::Event| typing || matches!(event, egui::Event::Key { modifiers, .. } if modifiers.command);
+    ui.input_mut(|i| i.events.retain(|event| viewer.held.take(event) || again(event)));
+    if escaped_before {
+        let (key, modifiers) = (Key::Escape, Modifiers::NONE);
+        let again = egui::Event::Key { key, physical_key: None, pressed: true, repeat: true, modifiers };
+        ui.input_mut(|i| i.events.push(again));
+    }
+    if typing {
+        return;
+    }
+    if ui.input(|i| viewer.picture.flies(i)) {
+        // Ctrl is for the pace; egui itself would quit.
+        let is_modified =
+            |event: &egui::Event| matches!(event, egui::Event::Key { modifiers, .. } if modifiers.command);
+        return ui.input_mut(|i| i.events.retain(|event| !is_modified(event)));
+    }
     for shortcut in SHORTCUTS {
         // A question mark needs Shift on most keyboards.
         let keys = shortcut.keys;
         let n_presses = match keys.logical_key {
             Key::Questionmark => ui.input(|i| i.num_presses(Key::Questionmark)),
+            Key::Escape if !escapes => 0,
             key => ui.input_mut(|i| i.count_and_consume_key(keys.modifiers, key)),
         };
         // A frame may take longer than two presses.

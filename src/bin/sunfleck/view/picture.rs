@@ -40,7 +40,7 @@ pub struct PictureView {
     rig: Option<(Arc<Settings>, Rig)>,
     /// When the camera last moved.
     moved: Option<f64>,
-    /// Whether keys move the camera.
+    /// Whether keys move the camera, or did so since Ctrl is held: Ctrl makes it slow, and none of its keys a shortcut.
     pub flying: bool,
     /// Keys that were pressed with Ctrl or Alt: they do not move the camera though the modifier is let go first.
     pub not_flying: Vec<Key>,
@@ -53,6 +53,14 @@ pub struct PictureView {
 }
 
 impl PictureView {
+    /// Whether keys are for flying.
+    pub fn flies(&self, input: &egui::InputState) -> bool {
+        let level = [Key::W, Key::A, Key::S, Key::D];
+        let starts = || level.iter().any(|key| input.key_down(*key) && !self.not_flying.contains(key));
+        let is_modified = input.modifiers.command || input.modifiers.alt;
+        self.flying || input.pointer.secondary_down() || !is_modified && starts()
+    }
+
     /// What is on the screen.
     pub fn painted(&self) -> Option<&Arc<Painted>> {
         self.painted.as_ref()
@@ -120,7 +128,7 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
         let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         painter.image(texture.id(), rect, uv, egui::Color32::WHITE);
     }
-    super::compare::overlay(ui, viewer, &painter, rect);
+    let reference_from = super::compare::overlay(ui, viewer, &painter, rect);
     // Beside the reference's line too, which takes the pointer for itself.
     let pointer = ui.input(|i| i.pointer.latest_pos()).filter(|p| response.contains_pointer() && area.contains(*p));
     let at = pointer.and_then(|p| on_film(rect, painted.size, p));
@@ -132,7 +140,7 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
     }
     click(ui, viewer, &response, rect, &painted);
     if rect.width() / painted.size[0] as f32 >= VALUES_FROM {
-        values(&painter, area, rect, &painted);
+        values(&painter, area, rect, &painted, reference_from);
     }
     if matches!(viewer.now.phase, Phase::Loading | Phase::Preparing) {
         waiting(ui, viewer, area);
@@ -200,9 +208,9 @@ fn place(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, size: Vec2, response: &
     let fitting = scale * (area.size() / size).min_elem();
     let rect_at = |zoom: f32, offset: Vec2| Rect::from_center_size(area.center() + offset, size * zoom / scale);
     // Ctrl and the wheel, or two fingers.
-    let factor = if response.hovered() { ui.input(egui::InputState::zoom_delta) } else { 1.0 };
+    let factor = if response.contains_pointer() { ui.input(egui::InputState::zoom_delta) } else { 1.0 };
     if factor != 1.0
-        && let Some(cursor) = response.hover_pos()
+        && let Some(cursor) = ui.input(|i| i.pointer.latest_pos())
     {
         let before = view.zoom.unwrap_or(fitting);
         let after = (before * factor).clamp(fitting.min(1.0), MOST_ZOOM);
@@ -222,8 +230,8 @@ fn place(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, size: Vec2, response: &
     Rect::from_min_size(rect.min.round_to_pixels(scale), rect.size())
 }
 
-/// Numbers in pixels large enough.
-fn values(painter: &egui::Painter, area: Rect, rect: Rect, painted: &Painted) {
+/// Numbers in pixels large enough; those of the reference where their middle is right of `reference_from`, points.
+fn values(painter: &egui::Painter, area: Rect, rect: Rect, painted: &Painted, reference_from: Option<f32>) {
     let side = rect.width() / painted.size[0] as f32;
     let visible = area.intersect(rect);
     let range = |min: f32, max: f32, n: usize| (min / side).max(0.0) as usize..((max / side).ceil() as usize).min(n);
@@ -231,11 +239,17 @@ fn values(painter: &egui::Painter, area: Rect, rect: Rect, painted: &Painted) {
         for x in range(visible.min.x - rect.min.x, visible.max.x - rect.min.x, painted.size[0]) {
             let i = y * painted.size[0] + x;
             let corner = rect.min + vec2(x as f32, y as f32) * side;
-            let shade = painted.rgba[4 * i..4 * i + 3].iter().map(|&c| u32::from(c)).sum::<u32>();
+            let middle = corner + Vec2::splat(0.5 * side);
+            let reference = painted.reference.as_ref().filter(|_| reference_from.is_some_and(|from| middle.x > from));
+            let (rgba, value) = match reference {
+                Some((_, rgba)) => (rgba, painted.reference_value(x, y)),
+                None => (&painted.rgba, painted.value(x, y)),
+            };
+            let shade = rgba[4 * i..4 * i + 3].iter().map(|&c| u32::from(c)).sum::<u32>();
             let color = if shade > 384 { egui::Color32::BLACK } else { egui::Color32::WHITE };
-            let lines: Vec<String> = painted.value(x, y).iter().map(|&v| short(v)).collect();
+            let lines: Vec<String> = value.iter().map(|&v| short(v)).collect();
             painter.text(
-                corner + Vec2::splat(0.5 * side),
+                middle,
                 egui::Align2::CENTER_CENTER,
                 lines.join("\n"),
                 egui::FontId::monospace((side / 5.5).min(14.0)),
@@ -273,10 +287,11 @@ fn move_camera(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, response: &egui::
             act(viewer, &mut |rig| rig.look(LOOK * turn.x, -LOOK * turn.y));
         }
     }
-    if response.hovered() && !command {
+    // On the reference's line too, which takes the pointer for itself.
+    if response.contains_pointer() && !command {
         let wheel = ui.input(|i| i.smooth_scroll_delta().y);
         if wheel != 0.0 {
-            let pointer = response.hover_pos();
+            let pointer = ui.input(|i| i.pointer.latest_pos());
             let under = pointer.and_then(|p| under(viewer, shown, p));
             let cursor = pointer.map(|p| (p - shown.center()) / height).map(|p| glam::vec2(p.x, p.y));
             act(viewer, &mut |rig| rig.zoom(wheel * WHEEL, cursor, under));
@@ -286,7 +301,7 @@ fn move_camera(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, response: &egui::
     let was_flying = viewer.picture.flying;
     let not_flying = &mut viewer.picture.not_flying;
     let direction = if typing { Vec3::ZERO } else { ui.input(|i| flight(i, was_flying, not_flying)) };
-    viewer.picture.flying = direction != Vec3::ZERO;
+    viewer.picture.flying = direction != Vec3::ZERO || was_flying && command;
     if direction != Vec3::ZERO {
         let (pace, seconds) = ui.input(|i| {
             let pace = if i.modifiers.shift {
@@ -316,15 +331,18 @@ fn move_camera(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, response: &egui::
 /// those in `not` are left out until they are let go.
 fn flight(input: &egui::InputState, flying: bool, not: &mut Vec<Key>) -> Vec3 {
     not.retain(|key| input.key_down(*key));
-    let looking = input.pointer.secondary_down();
-    if input.modifiers.alt || input.modifiers.command && !(flying || looking) {
+    let free = flying || input.pointer.secondary_down();
+    if input.modifiers.alt || input.modifiers.command && !free {
         return Vec3::ZERO;
     }
+    let level = axis(input, not, Key::D, Key::A) * Vec3::X + axis(input, not, Key::W, Key::S) * Vec3::Z;
+    let rises = free || level != Vec3::ZERO;
+    level + if rises { axis(input, not, Key::E, Key::Q) * Vec3::Y } else { Vec3::ZERO }
+}
+
+fn axis(input: &egui::InputState, not: &[Key], plus: Key, minus: Key) -> f32 {
     let down = |key: Key| f32::from(input.key_down(key) && !not.contains(&key));
-    let axis = |plus: Key, minus: Key| down(plus) - down(minus);
-    let level = Vec3::new(axis(Key::D, Key::A), 0.0, axis(Key::W, Key::S));
-    let rises = flying || looking || level != Vec3::ZERO;
-    level + if rises { axis(Key::E, Key::Q) * Vec3::Y } else { Vec3::ZERO }
+    down(plus) - down(minus)
 }
 
 impl Viewer {

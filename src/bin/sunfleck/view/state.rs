@@ -4,7 +4,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::settings::Settings;
 
 /// Files that are remembered.
@@ -56,6 +55,23 @@ impl Edits {
         self.last = None;
     }
 
+    /// At every frame: edits while a button is down are one step, and of others than those before it went down.
+    pub fn pointer(&mut self, time: f64, goes_down: bool, is_down: bool) {
+        if goes_down {
+            self.end_step();
+        }
+        if let (true, Some((_, when))) = (is_down, &mut self.last) {
+            *when = time;
+        }
+    }
+
+    /// Changes the settings, and those of every step.
+    pub fn map(&mut self, change: impl FnMut(&Settings) -> Settings) {
+        let mut change = change;
+        let all = self.undo.iter_mut().chain(&mut self.redo).chain([&mut self.now]);
+        all.for_each(|settings| *settings = Arc::new(change(settings)));
+    }
+
     pub fn can_undo(&self) -> bool {
         !self.undo.is_empty()
     }
@@ -88,23 +104,15 @@ pub struct Remembered {
     pub show_settings: bool,
     pub show_inspect: bool,
     pub show_convergence: bool,
-    /// Name of the tone curve.
-    pub tone: String,
 }
 
 impl Default for Remembered {
     fn default() -> Self {
-        let tone = ToneMap::default().name().to_owned();
-        Self { recent: vec![], show_settings: true, show_inspect: true, show_convergence: false, tone }
+        Self { recent: vec![], show_settings: true, show_inspect: true, show_convergence: false }
     }
 }
 
 impl Remembered {
-    /// The tone curve of that name, else the usual one.
-    pub fn tone(&self) -> ToneMap {
-        ToneMap::from_name(&self.tone).unwrap_or_default()
-    }
-
     /// Puts a file first; names of shipped scenes are not remembered.
     pub fn opened(&mut self, name: &str) {
         let Ok(path) = Path::new(name).canonicalize() else { return };
@@ -143,6 +151,28 @@ mod tests {
         assert_eq!(edits.now().alpha, Some(0.29));
         edits.set("alpha", 20.0, with_alpha(0.5));
         assert!(!edits.can_redo());
+    }
+
+    #[test]
+    fn a_press_is_one_step_however_long_it_rests() {
+        let mut edits = Edits::new(with_alpha(0.1));
+        let mut time = 0.0;
+        for press in 1..=2 {
+            for i in 1..=3 {
+                edits.pointer(time, i == 1, true);
+                edits.set("alpha", time, with_alpha(0.1 * press as f32 + 0.01 * i as f32));
+                // Frames go by.
+                for _ in 0..30 {
+                    time += 0.1;
+                    edits.pointer(time, false, true);
+                }
+            }
+            time += 0.1;
+            edits.pointer(time, false, false);
+        }
+        let alphas: Vec<_> =
+            std::iter::from_fn(|| edits.can_undo().then(|| (edits.undo(), edits.now().alpha).1)).collect();
+        assert_eq!(alphas, [Some(0.13), Some(0.1)]);
     }
 
     #[test]

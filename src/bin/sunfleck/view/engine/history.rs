@@ -14,6 +14,7 @@ pub struct Record {
     pub seconds: f64,
     /// Median over the pixels, metres.
     pub radius: f32,
+    /// Of all iterations since the restart, together.
     pub times: StageTimes,
     pub n_photons: u32,
     pub n_paths: u32,

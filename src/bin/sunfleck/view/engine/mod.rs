@@ -29,10 +29,11 @@ use sunfleck::scene::load::Loaded;
 use sunfleck::scene::settings::Settings;
 
 pub use history::{History, Measured, Record, Series};
-pub use paint::{Comparison, Insides, Legend, Painted, Painting, Values, View};
+pub use paint::{Comparison, Insides, Legend, NOTHING, Painted, Painting, Values, View};
 pub use saving::Save;
 pub use session::Frame;
 use worker::Work;
+pub use worker::{is_asked_anew, is_other_scene};
 
 use crate::devices::Device;
 use crate::scenes::Source;

@@ -216,12 +216,29 @@ impl Painted {
             Values::Scalar(values) => values.get(i).map(|&v| vec![v]).unwrap_or_default(),
         }
     }
+
+    /// The same of the reference, as it is shown.
+    pub fn reference_value(&self, x: usize, y: usize) -> Vec<f32> {
+        let rgb = self.reference.as_ref().and_then(|(of, _)| of.picture.rgb.get(y * self.size[0] + x));
+        match (rgb, self.painting.view) {
+            (Some(&rgb), View::Stops) => vec![stops(rgb, self.exposure)],
+            (rgb, _) => rgb.map(|rgb| rgb.to_vec()).unwrap_or_default(),
+        }
+    }
+}
+
+/// Luminance after exposure, about mid grey.
+fn stops(rgb: [f32; 3], exposure: f32) -> f32 {
+    (luminance(rgb).max(0.0) / false_colour::MID_GREY).log2() + exposure
 }
 
 /// The reference, if it has the picture's size.
 pub fn fitting<'a>(reference: Option<&'a Arc<Reference>>, frame: &Frame) -> Option<&'a Arc<Reference>> {
     reference.filter(|r| (r.picture.size, r.picture.crop) == (frame.params.size, frame.params.crop))
 }
+
+/// 0 on a logarithmic scale, where there is nothing; not on the map. RGBA.
+pub const NOTHING: [u8; 4] = [72, 72, 72, 255];
 
 /// What [`View::Stops`] spans, about mid grey.
 const STOPS: [f32; 2] = [-8.0, 8.0];
@@ -328,8 +345,8 @@ impl Painter {
             View::Stops => {
                 let mut rgba = vec![];
                 false_colour::luminance_in_stops(&picture.rgb, exposure, STOPS, &mut rgba);
-                let stops = |&rgb: &[f32; 3]| (luminance(rgb).max(0.0) / false_colour::MID_GREY).log2() + exposure;
-                let values = Values::Scalar(Arc::new(picture.rgb.iter().map(stops).collect()));
+                let values = picture.rgb.iter().map(|&rgb| stops(rgb, exposure)).collect();
+                let values = Values::Scalar(Arc::new(values));
                 let legend = Some(Legend { range: STOPS, log: false, signed: false });
                 Colours { rgba, values, legend, mean: None }
             }
@@ -437,6 +454,11 @@ fn compared(
 fn scalar(values: Vec<f32>, log: bool) -> Colours {
     let mut rgba = vec![];
     let range = false_colour::scalar(&values, &Scale { range: None, log }, &mut rgba);
+    if log {
+        // It has no place on the scale, and is what one looks for: where nothing is found.
+        let zeros = rgba.chunks_exact_mut(4).zip(&values).filter(|(_, value)| **value == 0.0);
+        zeros.for_each(|(rgba, _)| rgba.copy_from_slice(&NOTHING));
+    }
     let legend = Some(Legend { range, log, signed: false });
     Colours { rgba, values: Values::Scalar(Arc::new(values)), legend, mean: None }
 }

@@ -7,7 +7,7 @@ use anyhow::Result;
 use sunfleck::inspect::{self, Split};
 use sunfleck::layout::Camera;
 use sunfleck::output::Picture;
-use sunfleck::ppm::{self, Error, Film, FirstRadii, Interrupt, Params, Stages};
+use sunfleck::ppm::{self, Error, Film, FirstRadii, Interrupt, Params, StageTimes, Stages};
 use sunfleck::scene::PackedScene;
 use sunfleck::scene::settings::Settings;
 
@@ -98,6 +98,8 @@ pub struct Session {
     /// Done in this estimate.
     pub n_iterations: u32,
     pub seconds: f64,
+    /// Of all of them.
+    times: StageTimes,
     /// Whether the stages have what the last iteration left: not if the one after it was interrupted.
     is_whole: bool,
     shown: Option<Shown>,
@@ -133,6 +135,7 @@ impl Session {
             first_radius: 0.0,
             n_iterations: 0,
             seconds: 0.0,
+            times: StageTimes::default(),
             is_whole: false,
             shown: None,
         })
@@ -156,6 +159,7 @@ impl Session {
         self.stages.set_camera(self.input.camera.pack(width, height), self.params.film_size())?;
         (self.estimate, self.is_preview) = (estimate, is_preview);
         (self.n_iterations, self.seconds, self.is_whole, self.shown) = (0, 0.0, false, None);
+        self.times = StageTimes::default();
         (self.split, self.radii) = (Split::default(), None);
         Ok(())
     }
@@ -186,14 +190,14 @@ impl Session {
             ppm::iterate(&mut *self.stages, &frame)?;
         }
         self.is_whole = true;
-        let times = self.stages.times()?;
+        self.times += self.stages.times()?;
         self.n_iterations += 1;
         self.seconds += began.elapsed().as_secs_f64();
         Ok(Record {
             iteration: self.n_iterations,
             seconds: self.seconds,
             radius: self.first_radius * frame.radius_scale,
-            times,
+            times: self.times,
             n_photons: self.stages.n_photons(),
             n_paths: self.params.n_paths,
         })

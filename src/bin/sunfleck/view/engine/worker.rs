@@ -116,10 +116,12 @@ impl Have {
             device.recover()?;
         }
         if reads {
-            // The memory of the old one first.
+            // The memory of the old one first; of the same scene, read again, the picture stays, for the file may be broken.
             (self.session, self.opened) = (None, None);
             shared.update(|board| {
-                (board.opened, board.frame, board.painted) = (None, None, None);
+                if before.scene != wanted.scene {
+                    (board.opened, board.frame, board.painted) = (None, None, None);
+                }
                 board.phase = if wanted.scene.is_some() { Phase::Loading } else { Phase::Empty };
             });
             let Some(choice) = wanted.scene.clone() else { return Ok(()) };
@@ -246,13 +248,18 @@ fn resting(wanted: &Wanted) -> Phase {
     if wanted.paused { Phase::Paused } else { Phase::Reached }
 }
 
-fn is_other_scene(before: &Wanted, now: &Wanted) -> bool {
+pub fn is_other_scene(before: &Wanted, now: &Wanted) -> bool {
     (&before.scene, before.reloads) != (&now.scene, now.reloads)
 }
 
 /// Whether the estimate that was wanted before is not the one wanted now, of the same scene.
 fn is_other_estimate(opened: &Opened, before: &Wanted, now: &Wanted) -> bool {
-    (before.moving, before.restarts) != (now.moving, now.restarts) || !is_rendered_alike(opened, before, now)
+    before.moving != now.moving || is_asked_anew(opened, before, now)
+}
+
+/// The same, but for the wish for a preview.
+pub fn is_asked_anew(opened: &Opened, before: &Wanted, now: &Wanted) -> bool {
+    before.restarts != now.restarts || !is_rendered_alike(opened, before, now)
 }
 
 /// Whether the settings leave the estimate as it is. Quick where they are the same.
@@ -270,7 +277,8 @@ fn rendered(opened: &Opened, wanted: &Wanted) -> (Settings, Option<(layout::Came
         (camera.pack(1, 1), camera.aspect)
     });
     let of_camera = settings.camera.clone().filter(|_| camera.is_none());
-    (Settings { exposure: None, iterations: None, seconds: None, camera: of_camera, ..searched(settings) }, camera)
+    let of_display = Settings { exposure: None, tonemap: None, ..searched(settings) };
+    (Settings { iterations: None, seconds: None, camera: of_camera, ..of_display }, camera)
 }
 
 /// The same, with nothing in the place of the default ways to search.
@@ -293,6 +301,7 @@ fn of_scene(settings: &Settings) -> Settings {
         seconds: None,
         seed: None,
         exposure: None,
+        tonemap: None,
         max_segments: None,
         camera: None,
         ..searched(settings)

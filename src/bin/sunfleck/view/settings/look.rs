@@ -33,10 +33,10 @@ const PRESETS: [([u32; 2], &str); 8] = [
 
 pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     size(ui, viewer, read);
-    exposure(ui, viewer);
+    exposure(ui, viewer, read);
     let mut changed = false;
-    let mut tone = viewer.wanted.painting.look.tonemap;
-    let reset = row(ui, TONE, tone != ToneMap::default(), |ui| {
+    let mut tone = viewer.look().tonemap;
+    let reset = row(ui, TONE, tone != read.tonemap.unwrap_or_default(), |ui| {
         let all = [
             (
                 ToneMap::Neutral,
@@ -50,8 +50,11 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
         changed = response.changed();
         response
     });
-    if changed || reset {
-        viewer.wanted.painting.look.tonemap = if reset { ToneMap::default() } else { tone };
+    if changed {
+        viewer.show_otherwise(ui, "tone curve", |s| s.tonemap = Some(tone));
+    }
+    if reset {
+        viewer.reset(ui, |s| s.tonemap = read.tonemap);
     }
 }
 
@@ -94,31 +97,34 @@ fn size(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     }
 }
 
-fn exposure(ui: &mut Ui, viewer: &mut Viewer) {
-    let read = viewer.opened().and_then(|opened| opened.source.settings.exposure);
+fn exposure(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     let shown = viewer.now.painted.as_ref().map_or(0.0, |painted| painted.exposure);
-    let look = &mut viewer.wanted.painting.look;
-    let mut is_given = look.exposure.is_some();
+    let mut exposure = viewer.look().exposure;
+    let mut is_given = exposure.is_some();
     let mut changed = false;
-    let reset = row(ui, EXPOSURE, look.exposure != read, |ui| {
+    let reset = row(ui, EXPOSURE, exposure != read.exposure, |ui| {
         let all = [(false, "Automatic", "From the picture's own brightness."), (true, "Given", "So many stops.")];
         let response = choice(ui, "exposure", &mut is_given, &all);
         changed = response.changed();
         response
     });
     if changed {
-        look.exposure = is_given.then_some((shown * 10.0).round() / 10.0);
+        exposure = is_given.then_some((shown * 10.0).round() / 10.0);
     }
     // Rounded as it is shown, so that nothing is −0.0; a picture's own brightness has more digits.
-    let mut stops = (f64::from(look.exposure.unwrap_or(shown)) * 10.0).round() / 10.0 + 0.0;
+    let mut stops = (f64::from(exposure.unwrap_or(shown)) * 10.0).round() / 10.0 + 0.0;
     row(ui, STOPS, false, |ui| {
         let response = slider(ui, &mut stops, -10.0..=10.0, |slider| slider.fixed_decimals(1).suffix(" EV"));
         if response.changed() {
-            look.exposure = Some((stops as f32).clamp(-64.0, 64.0));
+            exposure = Some((stops as f32).clamp(-64.0, 64.0));
+            changed = true;
         }
         response
     });
+    if changed {
+        viewer.show_otherwise(ui, "exposure", |s| s.exposure = exposure);
+    }
     if reset {
-        look.exposure = read;
+        viewer.reset(ui, |s| s.exposure = read.exposure);
     }
 }

@@ -58,7 +58,7 @@ impl Viewer {
     /// Changes settings back: a step of its own.
     fn reset(&mut self, ui: &Ui, change: impl FnOnce(&mut Settings)) {
         self.edits.end_step();
-        self.edit(ui, "reset", change);
+        self.edit_at(ui.input(|i| i.time), "reset", change);
         self.edits.end_step();
     }
 

@@ -2,6 +2,7 @@
 
 mod camera;
 mod files;
+mod habits;
 mod panels;
 mod shortcuts;
 mod snapshots;

@@ -8,7 +8,6 @@ use egui::{Event, Key, Modifiers, PointerButton, Role, ViewportCommand};
 use egui_kittest::kittest::{NodeT, Queryable};
 use sunfleck::output;
 use sunfleck::output::difference::Measure;
-use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::Accelerator;
 use sunfleck::scene::shipped::NAMES;
 
@@ -201,7 +200,7 @@ fn a_reference_that_does_not_fit_is_told() {
 }
 
 #[test]
-fn the_tone_curve_comes_back() {
+fn the_panels_come_back() {
     #[derive(Default)]
     struct Kept(std::collections::HashMap<String, String>);
     impl eframe::Storage for Kept {
@@ -217,12 +216,12 @@ fn the_tone_curve_comes_back() {
         fn flush(&mut self) {}
     }
     let mut window = Window::new(None);
-    window.viewer().wanted.painting.look.tonemap = ToneMap::Agx;
+    window.viewer().remembered.show_convergence = true;
     let mut kept = Kept::default();
     window.viewer().save(&mut kept);
     let mut viewer = Viewer::new(super::engine(), Arc::new(|| {}), First::default());
     viewer.enter(Some(&kept));
-    assert_eq!(viewer.wanted.painting.look.tonemap, ToneMap::Agx);
+    assert!(viewer.remembered.show_convergence);
 }
 
 /// Each control of the settings changes them, or how the picture is shown.

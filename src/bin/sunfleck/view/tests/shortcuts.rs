@@ -2,6 +2,8 @@
 
 use eframe::egui;
 use egui::{Key, Modifiers, ViewportCommand};
+use sunfleck::output::display::Look;
+use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::settings::Settings;
 
 use super::{ITERATIONS, Window};
@@ -62,6 +64,18 @@ fn asks(before: &mut Seen, window: &mut Window, purpose: Purpose) {
 fn edit(before: &mut Seen, change: impl FnOnce(&mut Settings)) {
     change(&mut before.settings);
     before.wanted.settings = Some(before.settings.clone().into());
+}
+
+/// Changes how the picture is shown; what is rendered is the same.
+fn shown(before: &mut Seen, change: impl FnOnce(&mut Settings)) {
+    edit(before, change);
+    let Settings { exposure, tonemap, .. } = before.settings;
+    before.wanted.painting.look = Look { exposure, tonemap: tonemap.unwrap_or_default() };
+}
+
+fn exposure(window: &mut Window, stops: f32) {
+    window.viewer().edit_at(0.0, "test", |settings| settings.exposure = Some(stops));
+    window.step();
 }
 
 fn alpha(window: &mut Window, alpha: f32) {
@@ -128,7 +142,11 @@ const CASES: &[Case] = &[
         },
     ),
     after(
-        |window| window.viewer().output = Some(window.path("picture.exr")),
+        |window| {
+            let path = window.path("picture.exr");
+            let scene = window.viewer().wanted.scene.clone();
+            window.viewer().saved_as = Some((scene, path));
+        },
         COMMAND,
         Key::S,
         |_, window| saved(window),
@@ -162,24 +180,24 @@ const CASES: &[Case] = &[
         |seen, _| edit(seen, |settings| settings.alpha = Some(0.5)),
     ),
     after(
-        |window| window.viewer().wanted.painting.look.exposure = Some(1.0),
+        |window| exposure(window, 1.0),
         SHIFT,
         Key::E,
-        |seen, _| seen.wanted.painting.look.exposure = Some(0.5),
+        |seen, _| shown(seen, |settings| settings.exposure = Some(0.5)),
     ),
     after(
-        |window| window.viewer().wanted.painting.look.exposure = Some(1.0),
+        |window| exposure(window, 1.0),
         Modifiers::NONE,
         Key::E,
-        |seen, _| seen.wanted.painting.look.exposure = Some(1.5),
+        |seen, _| shown(seen, |settings| settings.exposure = Some(1.5)),
     ),
     after(
-        |window| window.viewer().wanted.painting.look.exposure = Some(1.0),
+        |window| exposure(window, 1.0),
         Modifiers::NONE,
         Key::X,
-        |seen, _| seen.wanted.painting.look.exposure = None,
+        |seen, _| shown(seen, |settings| settings.exposure = None),
     ),
-    case(Modifiers::NONE, Key::T, paints_otherwise),
+    case(Modifiers::NONE, Key::T, |seen, _| shown(seen, |settings| settings.tonemap = Some(ToneMap::Agx))),
     after(
         |window| assert_eq!(window.viewer().now.estimate, 1),
         Modifiers::NONE,
@@ -271,7 +289,7 @@ fn every_shortcut_is_tested() {
 #[test]
 fn each_press_counts_once() {
     let mut window = Window::with_picture();
-    window.viewer().wanted.painting.look.exposure = Some(1.0);
+    exposure(&mut window, 1.0);
     let event = |pressed, repeat| egui::Event::Key {
         key: Key::E,
         physical_key: None,
@@ -284,5 +302,5 @@ fn each_press_counts_once() {
     window.step();
     window.harness.input_mut().events.extend([event(true, true), event(false, false)]);
     window.step();
-    assert_eq!(window.viewer().wanted.painting.look.exposure, Some(2.0));
+    assert_eq!(window.viewer().edits.now().exposure, Some(2.0));
 }

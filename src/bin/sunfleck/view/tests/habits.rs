@@ -1,0 +1,261 @@
+//! What people do without thinking: Escape, keys let go in any order, reading a file again, going back.
+
+use eframe::egui;
+use egui::{Event, Key, Modifiers, ViewportCommand};
+use egui_kittest::kittest::Queryable;
+use sunfleck::output::difference::Measure;
+use sunfleck::scene::settings::Count;
+
+use super::Window;
+use crate::view::engine::{Comparison, Phase, View};
+
+/// A press or a release of a key that has another name with Shift.
+fn key(key: Key, physical: Key, pressed: bool, modifiers: Modifiers) -> [Event; 2] {
+    let event = Event::Key { key, physical_key: Some(physical), pressed, repeat: false, modifiers };
+    [Event::ModifiersChanged(modifiers), event]
+}
+
+/// A scene in a file of its own.
+fn with_file(text: &str) -> (Window, std::path::PathBuf) {
+    let mut window = Window::new(None);
+    let file = window.path("own.toml");
+    std::fs::write(&file, text).unwrap();
+    window.viewer().open(file.to_string_lossy());
+    window.wait_for_picture();
+    (window, file)
+}
+
+const OWN: &str = "scene = \"cornell\"\nsize = [16, 12]\nphotons = 200\nalpha = 0.6\n";
+
+#[test]
+fn shift_may_be_let_go_first() {
+    let mut window = Window::with_picture();
+    for n in 1..=3 {
+        window.harness.input_mut().events.extend(key(Key::Plus, Key::Equals, true, Modifiers::SHIFT));
+        window.step();
+        window.harness.input_mut().events.extend(key(Key::Equals, Key::Equals, false, Modifiers::NONE));
+        window.step();
+        assert_eq!(window.viewer().edits.now().photons, Some(Count(500 << n)), "{n} presses");
+    }
+    for n in 1..=3 {
+        window.harness.input_mut().events.extend(key(Key::Questionmark, Key::Slash, true, Modifiers::SHIFT));
+        window.step();
+        window.harness.input_mut().events.extend(key(Key::Slash, Key::Slash, false, Modifiers::NONE));
+        window.step();
+        assert_eq!(window.viewer().show_help, n % 2 == 1, "{n} presses");
+    }
+}
+
+#[test]
+fn escape_is_first_for_what_is_open() {
+    let mut window = Window::with_picture();
+    window.viewer().selected = Some(0);
+    window.steps(2);
+    // A list.
+    window.harness.get_by_role_and_label(egui::accesskit::Role::ComboBox, "Show").click_accesskit();
+    window.steps(3);
+    assert!(window.shows("Albedo"));
+    window.press(Modifiers::NONE, Key::Escape);
+    window.steps(3);
+    assert!(!window.shows("Albedo") && window.viewer().selected == Some(0));
+    // A field: what was typed is forgotten.
+    let before = window.viewer().edits.now().clone();
+    window.harness.get_by_role_and_label(egui::accesskit::Role::SpinButton, "Seed").click();
+    window.steps(3);
+    for digit in ["7", "7"] {
+        window.harness.input_mut().events.push(Event::Text(digit.to_owned()));
+        window.step();
+    }
+    window.press(Modifiers::NONE, Key::Escape);
+    window.steps(3);
+    assert_eq!(window.viewer().edits.now().difference(&before), [""; 0]);
+    assert_eq!(window.viewer().selected, Some(0));
+    window.press(Modifiers::NONE, Key::Escape);
+    assert_eq!(window.viewer().selected, None);
+}
+
+/// Ctrl slows a flight down: none of its keys closes the scene, or the window, before Ctrl has been let go.
+#[test]
+fn a_slow_flight_is_no_shortcut() {
+    let mut window = Window::with_picture();
+    let command = Modifiers::COMMAND | Modifiers::CTRL;
+    let send = |window: &mut Window, events: &[Event]| {
+        window.harness.input_mut().events.extend_from_slice(events);
+        window.step();
+    };
+    send(&mut window, &key(Key::W, Key::W, true, Modifiers::NONE));
+    send(&mut window, &[Event::ModifiersChanged(command)]);
+    send(&mut window, &key(Key::W, Key::W, false, command));
+    send(&mut window, &key(Key::W, Key::W, true, command));
+    send(&mut window, &key(Key::Q, Key::Q, true, command));
+    window.steps(3);
+    assert!(window.viewer().wanted.scene.is_some());
+    assert!(!window.commands.contains(&ViewportCommand::Close));
+    send(&mut window, &key(Key::W, Key::W, false, command));
+    send(&mut window, &key(Key::Q, Key::Q, false, command));
+    send(&mut window, &[Event::ModifiersChanged(Modifiers::NONE)]);
+    window.press(Modifiers::COMMAND, Key::W);
+    assert!(window.viewer().wanted.scene.is_none());
+}
+
+/// Rising with a letter of its own begins together with the flight.
+#[test]
+fn a_flight_that_begins_brightens_nothing() {
+    let mut window = Window::with_picture();
+    let events = [key(Key::W, Key::W, true, Modifiers::NONE), key(Key::E, Key::E, true, Modifiers::NONE)];
+    window.harness.input_mut().events.extend(events.into_iter().flatten());
+    window.steps(3);
+    assert_eq!(window.viewer().edits.now().exposure, None);
+    assert!(window.viewer().edits.now().camera.is_some());
+}
+
+#[test]
+fn what_is_changed_by_hand_outlives_a_file_that_is_read_again() {
+    let (mut window, file) = with_file(OWN);
+    window.viewer().edit_at(0.0, "seed", |s| s.seed = Some(5));
+    window.viewer().edit_at(9.0, "exposure", |s| s.exposure = Some(1.5));
+    // Changed and changed back: as if it had never been.
+    window.viewer().edit_at(18.0, "alpha", |s| s.alpha = Some(0.7));
+    window.viewer().edit_at(27.0, "alpha", |s| s.alpha = Some(0.6));
+    std::fs::write(&file, OWN.replace("0.6", "0.8").replace("200", "300")).unwrap();
+    window.press(Modifiers::COMMAND, Key::R);
+    window.wait("the file as it is now", |viewer| viewer.opened().is_some_and(|o| o.read.alpha == Some(0.8)));
+    window.wait_for_picture();
+    let now = window.viewer().edits.now().clone();
+    assert_eq!((now.alpha, now.photons, now.seed, now.exposure), (Some(0.8), Some(Count(300)), Some(5), Some(1.5)));
+    assert_eq!(window.viewer().now.frame.as_ref().unwrap().params.n_paths, 300);
+    // The steps that led there can still be undone.
+    for expected in [Some(0.7), Some(0.8)] {
+        window.press(Modifiers::COMMAND, Key::Z);
+        assert_eq!(window.viewer().edits.now().alpha, expected);
+    }
+    window.press(Modifiers::COMMAND, Key::Z);
+    assert_eq!((window.viewer().edits.now().exposure, window.viewer().edits.now().seed), (None, Some(5)));
+    // Opening it anew begins anew.
+    window.viewer().open(file.to_string_lossy());
+    window.wait("the file alone", |viewer| viewer.edits.now().seed.is_none() && viewer.now.phase == Phase::Reached);
+}
+
+#[test]
+fn a_broken_file_leaves_the_picture() {
+    let (mut window, file) = with_file(OWN);
+    for (i, text) in [Some("scene = "), None].into_iter().enumerate() {
+        match text {
+            Some(text) => std::fs::write(&file, text).unwrap(),
+            None => std::fs::remove_file(&file).unwrap(),
+        }
+        window.press(Modifiers::COMMAND, Key::R);
+        window.wait("failure", |viewer| matches!(viewer.now.phase, Phase::Failed(_)));
+        assert!(window.viewer().picture.painted().is_some() && window.viewer().opened().is_some());
+        let name = format!("saved-{i}.exr");
+        let saved = window.path(&name);
+        window.viewer().save_to(saved.clone());
+        window.wait_for_message(&name);
+        assert_eq!(sunfleck::output::exr::read(&saved).unwrap().size, [16, 12]);
+    }
+    std::fs::write(&file, OWN).unwrap();
+    window.press(Modifiers::COMMAND, Key::R);
+    window.wait_for_picture();
+}
+
+/// `-o` names a place for the scene it is given with, not for one that is opened later.
+#[test]
+fn a_picture_is_not_saved_over_that_of_another_scene() {
+    let (mut window, _) = with_file(OWN);
+    let place = window.path("place.exr");
+    window.viewer().saved_as = Some((window.viewer().wanted.scene.clone(), place.clone()));
+    assert_eq!(window.viewer().place(), Some(&place));
+    window.viewer().open("glass");
+    assert_eq!(window.viewer().place(), None);
+    // Without a scene it is for the first that is opened.
+    let mut window = Window::new(None);
+    window.viewer().saved_as = Some((None, place.clone()));
+    for expected in [Some(&place), None] {
+        window.viewer().open(if expected.is_some() { "cornell" } else { "glass" });
+        assert_eq!(window.viewer().place(), expected);
+    }
+}
+
+#[test]
+fn how_the_picture_is_shown_can_be_undone_and_is_told() {
+    let mut window = Window::with_picture();
+    let estimate = window.viewer().now.estimate;
+    window.press(Modifiers::NONE, Key::T);
+    window.press(Modifiers::SHIFT, Key::E);
+    window.press(Modifiers::NONE, Key::X);
+    window.viewer().edit_at(99.0, "exposure", |s| s.exposure = Some(1.25));
+    window.step();
+    let command = window.viewer().command().unwrap();
+    assert!(command.contains(" --set exposure=1.25 ") && command.contains(" --set tonemap=agx "), "{command}");
+    let text = window.viewer().settings_text().unwrap();
+    assert!(text.contains("exposure = 1.25\n") && text.contains("tonemap = \"agx\"\n"), "{text}");
+    window.wait("shown", |viewer| viewer.picture.painted().is_some_and(|painted| painted.exposure == 1.25));
+    while window.viewer().edits.can_undo() {
+        window.press(Modifiers::COMMAND, Key::Z);
+    }
+    window.step();
+    assert_eq!(window.viewer().wanted.painting.look, Default::default());
+    window.press(Modifiers::NONE, Key::T);
+    window.activate("Reset tone curve");
+    assert_eq!(window.viewer().edits.now().tonemap, None);
+    // And nothing was rendered for it.
+    assert_eq!(window.viewer().now.estimate, estimate);
+}
+
+#[test]
+fn the_plots_keep_their_height() {
+    let mut window = Window::with_picture();
+    window.viewer().remembered.show_convergence = true;
+    window.steps(4);
+    let height = |window: &mut Window| window.viewer().picture.area.unwrap().height();
+    let before = height(&mut window);
+    window.viewer().wanted.paused = true;
+    for _ in 0..3 {
+        window.press(Modifiers::NONE, Key::Space);
+        for _ in 0..10 {
+            window.step();
+            assert_eq!(height(&mut window), before);
+        }
+    }
+}
+
+#[test]
+fn a_menu_shows_the_inspection_where_there_is_room_for_one_panel() {
+    let mut window = Window::with_picture();
+    window.harness.set_size([480.0, 320.0].into());
+    window.steps(3);
+    assert!(!window.shows("Under the cursor"));
+    window.click("Window");
+    window.click("Inspect");
+    assert!(window.shows("Under the cursor") && !window.shows("Estimator"));
+}
+
+/// Values and the inspection are those of what is seen.
+#[test]
+fn the_reference_has_numbers_of_its_own() {
+    let mut window = Window::with_picture();
+    window.activate("Pin");
+    window.wait("reference", |viewer| viewer.now.reference.is_some());
+    let estimate = window.viewer().now.estimate;
+    window.viewer().edit_at(0.0, "light", |s| s.light_scale = Some(2.0));
+    window.viewer().wanted.painting.comparison = Comparison::Wipe;
+    window.wait("another estimate", |viewer| viewer.now.estimate > estimate);
+    window.wait_for_picture();
+    window.wait("both", |viewer| viewer.picture.painted().is_some_and(|p| p.reference.is_some()));
+    let painted = window.viewer().picture.painted().unwrap().clone();
+    let middle = |value: Vec<f32>| value.iter().sum::<f32>();
+    let ratio = middle(painted.value(16, 20)) / middle(painted.reference_value(16, 20));
+    assert!((ratio - 2.0).abs() < 1e-3, "{ratio}");
+    let at = window.viewer().picture.area.unwrap().center();
+    window.harness.input_mut().events.push(Event::PointerMoved(at));
+    window.steps(3);
+    assert!(window.shows("Reference"));
+    window.viewer().wanted.painting.view = View::Stops;
+    window.wait("stops", |viewer| viewer.picture.painted().is_some_and(|p| p.painting.view == View::Stops));
+    let painted = window.viewer().picture.painted().unwrap().clone();
+    let [a, b] = [painted.value(16, 20), painted.reference_value(16, 20)].map(|v| <[f32; 1]>::try_from(v).unwrap()[0]);
+    assert!((a - b - 1.0).abs() < 1e-3, "{a} and {b} stops");
+    // As does the difference, which is of both.
+    window.viewer().wanted.painting.comparison = Comparison::Difference(Measure::Absolute);
+    window.wait("difference", |viewer| viewer.picture.painted().is_some_and(|p| p.mean.is_some_and(|mean| mean > 0.0)));
+}
