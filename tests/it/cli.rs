@@ -263,6 +263,21 @@ fn requests_that_cannot_be_met() {
 }
 
 #[test]
+fn how_a_picture_is_shown_is_a_setting_too() {
+    let folder = folder_with_floor();
+    let picture = |flags: &str| {
+        let output = render(folder.path(), &format!("-o a.png {flags}"));
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        image::open(folder.path().join("a.png")).unwrap().to_rgb8()
+    };
+    let by_flags = picture("--exposure 3 --tonemap agx");
+    assert!(picture("--set exposure=3 --set tonemap=agx") == by_flags);
+    assert!(picture("--set exposure=3 --set tonemap=srgb --tonemap agx") == by_flags);
+    assert!(picture("--set exposure=3") != by_flags);
+    assert_error(&render(folder.path(), "-o a.png --set tonemap=aces"), 2, &["tonemap", "agx"]);
+}
+
+#[test]
 fn pictures_and_their_headers() {
     let folder = folder_with_floor();
     let output = render(folder.path(), "-o a.exr -o a.png --seed 7 --alpha 0.5 --radius 0.25 --variance");
