@@ -12,7 +12,7 @@ use sunfleck::scene::load::{Loaded, load_environment};
 use sunfleck::scene::{Camera, Scene, Settings, settings};
 
 use crate::cli::{InputArgs, RenderArgs, Usage};
-use crate::scenes::Source;
+use crate::scenes::{Source, place};
 
 /// Where nothing is said: as many iterations as look good on the shipped scenes, but no longer than one waits for.
 const DEFAULT_ITERATIONS: u32 = 256;
@@ -257,10 +257,7 @@ fn check_outputs(args: &RenderArgs) -> Result<()> {
 }
 
 fn same_file(a: &Path, b: &Path) -> bool {
-    let place = |path: &Path| {
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        path.canonicalize().ok().or_else(|| Some(folder.canonicalize().ok()?.join(path.file_name()?)))
-    };
+    let place = |path: &Path| path.canonicalize().ok().or_else(|| place(path));
     a == b || place(a).is_some_and(|a| place(b).is_some_and(|b| a == b))
 }
 

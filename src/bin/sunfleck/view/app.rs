@@ -270,9 +270,9 @@ impl Viewer {
         self.move_rig(time, &mut |rig| rig.frame_all(bounds, width as f32 / height as f32));
     }
 
-    /// The settings as a file holds them.
-    pub fn settings_text(&self) -> Option<String> {
-        let mut settings = self.editing.as_ref()?.source.rooted(self.edits.now());
+    /// The settings as `file` is to hold them.
+    pub fn settings_text(&self, file: &Path) -> Option<String> {
+        let mut settings = self.editing.as_ref()?.source.rooted(self.edits.now(), file);
         settings.exposure = self.wanted.painting.look.exposure;
         Some(settings.to_toml())
     }
