@@ -43,8 +43,7 @@ impl First {
         if let Some(path) = &args.output {
             crate::job::check_output(path)?;
         }
-        let mut set = args.set.clone();
-        set.extend(args.pairs()?);
+        let set = args.pairs()?;
         let always = args.device.pairs();
         let choice = match &args.scene {
             Some(name) => Some(Choice { name: name.clone(), set: [set, always.clone()].concat() }),
