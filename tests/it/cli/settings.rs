@@ -12,6 +12,10 @@ fn pixels(folder: &Path, scene: &str, extra: &[&str]) -> Vec<[f32; 3]> {
     output::exr::read(&folder.join("a.exr")).unwrap().rgb
 }
 
+fn mean(pixels: &[[f32; 3]]) -> f32 {
+    pixels.as_flattened().iter().sum::<f32>() / pixels.as_flattened().len() as f32
+}
+
 #[test]
 fn a_camera_that_is_named_is_changed_by_set() {
     let folder = tempfile::tempdir().unwrap();
@@ -56,4 +60,35 @@ fn an_environment_that_is_named_is_changed_by_set() {
     for scene in ["floor.gltf", "sub/red.toml"] {
         assert!(render(scene, &[&env[..], &set].concat()) == expected, "{scene}");
     }
+}
+
+#[test]
+fn turning_lights_off_turns_no_sky_on() {
+    let folder = folder_with_floor();
+    let mut dark = floor();
+    dark["scenes"][0]["nodes"] = json!([0, 2]);
+    fs::write(folder.path().join("dark.gltf"), dark.to_string()).unwrap();
+    let render = |scene, set: &[&str]| {
+        let extra: Vec<_> = set.iter().flat_map(|pair| ["--set", *pair]).collect();
+        mean(&pixels(folder.path(), scene, &extra))
+    };
+    // Lights of the file, or of the settings.
+    let lamp = "sphere.0={centre=[0, 2, 0], radius=0.1, emission=[9, 9, 9]}";
+    for (scene, set) in [
+        ("floor.gltf", vec!["light_scale=0"]),
+        ("floor.gltf", vec!["scene_light.0={index=0, on=false}"]),
+        ("cornell", vec!["light_scale=0"]),
+        ("cornell", vec!["material.lamp.emission=[0, 0, 0]"]),
+        ("dark.gltf", vec![lamp, "light_scale=0"]),
+        ("dark.gltf", vec!["light_scale=0"]),
+    ] {
+        assert_eq!(render(scene, &set), 0.0, "{scene} {set:?}");
+    }
+    assert!(render("dark.gltf", &[lamp]) > 0.0);
+    // The sky is scaled as all light is.
+    let [whole, half] = ["light_scale=1", "light_scale=0.5"].map(|scale| render("dark.gltf", &[scale]));
+    assert!(whole > 0.1 && (half / whole - 0.5).abs() < 1e-3, "{whole} {half}");
+    // Nor can there be a sky to change, whether the lamp is on or off.
+    let sky = "render cornell -o a.exr --set environment.strength=2 --set material.lamp.emission=[0,0,0]";
+    assert_error(&sunfleck(folder.path(), words(sky)), 1, &["environment: neither file nor color is given"]);
 }
