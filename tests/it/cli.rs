@@ -1,6 +1,7 @@
 //! The program as its users meet it: what it prints, what it writes, how it exits.
 
 mod devices;
+mod settings;
 
 use std::f32::consts::FRAC_1_SQRT_2;
 use std::fs;

@@ -4,7 +4,7 @@ pub mod mesh;
 pub mod points;
 pub mod values;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -14,6 +14,7 @@ use sunfleck::output::tonemap::ToneMap;
 use sunfleck::ppm::{Direct, FirstRadius, Kernel};
 use sunfleck::scene::Accelerator;
 use sunfleck::scene::settings::{Index, parse_count};
+use toml::{Table, Value};
 #[cfg(feature = "view")]
 use values::noise;
 use values::{Crop, accelerator, alpha, crop, direct, exposure, index, kernel, positive_f64, radius, size, tonemap};
@@ -137,6 +138,14 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub input: InputArgs,
 
+    /// Camera, by name or by number from 0 [default: the first]
+    #[arg(long, value_name = "NAME|N", help_heading = "Picture")]
+    pub camera: Option<String>,
+
+    /// Environment map: .hdr or .exr, latitude-longitude
+    #[arg(long, value_name = "FILE", help_heading = "Picture")]
+    pub env: Option<PathBuf>,
+
     /// Override a key of the settings file, such as camera.yfov_degrees=40 or material.NAME.roughness=0.2; repeatable
     #[arg(long, value_name = "KEY=VALUE", help_heading = "Estimator")]
     pub set: Vec<String>,
@@ -237,16 +246,42 @@ pub struct ViewArgs {
     pub device: DeviceArgs,
 }
 
+/// What `--camera` and `--env` say, each in place of the file's whole table, and the pairs of `--set`, which change it.
+fn over_named(camera: Option<&str>, env: Option<&Path>, set: &[String]) -> Result<Vec<String>, Usage> {
+    let mut named = vec![];
+    named.extend(camera.map(|name| ("camera", "name", Value::from(name))));
+    if let Some(path) = env {
+        // The settings file may lie elsewhere.
+        let absolute = std::path::absolute(path).map_err(|e| Usage(format!("--env: {e}")))?;
+        let file = absolute.to_str().ok_or_else(|| Usage(format!("--env {}: is not UTF-8", path.display())))?;
+        named.push(("environment", "file", Value::from(file)));
+    }
+    let mut pairs = vec![];
+    for (table, field, value) in &named {
+        let fields = Table::from_iter([((*field).to_owned(), value.clone())]);
+        pairs.push(format!("{table}={}", Value::Table(fields)));
+    }
+    pairs.extend_from_slice(set);
+    // Over a pair that says the same, as any flag.
+    pairs.extend(named.iter().map(|(table, field, value)| format!("{table}.{field}={value}")));
+    Ok(pairs)
+}
+
+impl RenderArgs {
+    /// What `--camera`, `--env`, `--set` and the flags of the device say over the settings, as `--set` takes it.
+    pub fn pairs(&self) -> Result<Vec<String>, Usage> {
+        let mut pairs = over_named(self.camera.as_deref(), self.env.as_deref(), &self.set)?;
+        pairs.extend(self.device.pairs());
+        Ok(pairs)
+    }
+}
+
 #[cfg(feature = "view")]
 impl ViewArgs {
-    /// What the flags say over the settings, as `--set` takes it.
-    pub fn pairs(&self) -> std::io::Result<Vec<String>> {
-        let mut pairs = vec![];
+    /// What the flags but those of the device say over the settings, as `--set` takes it.
+    pub fn pairs(&self) -> Result<Vec<String>, Usage> {
+        let mut pairs = over_named(self.camera.as_deref(), self.env.as_deref(), &self.set)?;
         pairs.extend(self.resolution.map(|[width, height]| format!("size=[{width}, {height}]")));
-        pairs.extend(self.camera.iter().map(|name| format!("camera.name={name:?}")));
-        if let Some(path) = &self.env {
-            pairs.push(format!("environment={{file={:?}}}", std::path::absolute(path)?.to_string_lossy()));
-        }
         pairs.extend(self.photons.map(|n| format!("photons={n}")));
         Ok(pairs)
     }
@@ -262,14 +297,6 @@ pub struct InputArgs {
     /// Compute a part only: fractions of width and height between 0 and 1, y down
     #[arg(long, value_name = "x0,x1,y0,y1", allow_hyphen_values = true, value_parser = crop, help_heading = "Picture")]
     pub crop: Option<Crop>,
-
-    /// Camera, by name or by number from 0 [default: the first]
-    #[arg(long, value_name = "NAME|N", help_heading = "Picture")]
-    pub camera: Option<String>,
-
-    /// Environment map: .hdr or .exr, latitude-longitude
-    #[arg(long, value_name = "FILE", help_heading = "Picture")]
-    pub env: Option<PathBuf>,
 
     /// Photon paths an iteration, such as 500k or 2M [default: 500k]
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = parse_count, help_heading = "Estimator")]
@@ -361,6 +388,8 @@ fn usage_line(text: &str, kind: ErrorKind, is_first: bool) -> String {
 mod tests {
     use super::*;
     use clap::CommandFactory;
+    #[cfg(feature = "view")]
+    use sunfleck::scene::settings::{CameraSettings, EnvironmentSettings};
 
     #[test]
     fn the_declaration_is_sound() {
@@ -379,21 +408,38 @@ mod tests {
             "--photons",
             "2k",
             "--camera",
-            "a \"b\"",
+            "a \"b\"\u{a0}'c'\n",
             "--env",
-            "/x y.hdr",
+            "/x\u{a0}y.hdr",
+            "--set",
+            "camera.forward=[0, 0, 1]",
+            "--set",
+            "camera.name=another",
+            "--set",
+            "environment.rotation_degrees=90",
             "--index",
             "hardware",
         ];
         let Some(Command::View(args)) = Cli::parse_from(line).command else { panic!("another command") };
         let mut settings = sunfleck::scene::settings::Settings::default();
+        // Of a file: what is named takes the place of the whole table.
+        settings.set("camera={name=\"c\", yfov_degrees=10}").unwrap();
+        settings.set("environment={color=[1, 0, 0], strength=7}").unwrap();
         for pair in args.pairs().unwrap().into_iter().chain(args.device.pairs()) {
             settings.set(&pair).unwrap();
         }
         assert_eq!(settings.to_toml().matches("index = \"hardware\"").count(), 1);
         assert_eq!(settings.size.map(|size| size.0), Some([64, 48]));
         assert_eq!(settings.photons.map(|n| n.0), Some(2000));
-        assert_eq!(settings.camera.and_then(|camera| camera.name).as_deref(), Some("a \"b\""));
-        assert_eq!(settings.environment.and_then(|environment| environment.file).as_deref(), Some("/x y.hdr"));
+        let name = Some("a \"b\"\u{a0}'c'\n".to_owned());
+        assert_eq!(
+            settings.camera,
+            Some(CameraSettings { name, forward: Some([0.0, 0.0, 1.0]), ..Default::default() })
+        );
+        let file = Some("/x\u{a0}y.hdr".to_owned());
+        assert_eq!(
+            settings.environment,
+            Some(EnvironmentSettings { file, rotation_degrees: Some(90.0), ..Default::default() })
+        );
     }
 }

@@ -7,12 +7,12 @@ use sunfleck::layout::EyeVertex;
 use sunfleck::output::atomic;
 use sunfleck::output::png::Look;
 use sunfleck::ppm::{Direct, FirstRadius, Kernel, Params};
-use sunfleck::scene::defaults::add_default_light;
-use sunfleck::scene::load::{Loaded, load_environment};
+use sunfleck::scene::defaults::{add_default_light, has_light};
+use sunfleck::scene::load::Loaded;
 use sunfleck::scene::{Camera, Scene, Settings, settings};
 
 use crate::cli::{InputArgs, RenderArgs, Usage};
-use crate::scenes::Source;
+use crate::scenes::{Source, place};
 
 /// Where nothing is said: as many iterations as look good on the shipped scenes, but no longer than one waits for.
 const DEFAULT_ITERATIONS: u32 = 256;
@@ -50,7 +50,7 @@ pub struct Job {
     pub budget: Budget,
     /// One radius for all pixels, the median of the automatic ones.
     pub one_radius: bool,
-    /// With what `--set`, `--index` and `--accel` say over its settings.
+    /// With what `--camera`, `--env`, `--set`, `--index` and `--accel` say over its settings.
     pub source: Source,
 }
 
@@ -69,8 +69,7 @@ impl Job {
             args.scene.clone().ok_or_else(|| Usage("which scene? sunfleck render SCENE -o out.png".into()))?;
         check_outputs(args)?;
         let mut source = Source::resolve(&scene_name)?;
-        source.set(&args.set)?;
-        source.set(&args.device.pairs())?;
+        source.set(&args.pairs()?)?;
         let settings = &source.settings;
         let iterations = args.iterations.or(settings.iterations.map(|n| n.0));
         let budget = match (iterations, args.seconds.or(settings.seconds)) {
@@ -101,23 +100,18 @@ impl Job {
 ///
 /// `source` says where the scene came from; its own settings are not looked at.
 pub fn prepare(source: &Source, settings: &Settings, mut loaded: Loaded, args: &InputArgs) -> Result<Input> {
-    // What the command line names replaces what the file says, and is not looked for.
-    let mut settings = settings.clone();
-    settings.environment = settings.environment.filter(|_| args.env.is_none());
-    settings.camera = settings.camera.filter(|_| args.camera.is_none());
-    // Wherever the light comes from then.
-    settings.add_default_camera(&mut loaded.scene);
-    if let Some(path) = &args.env {
-        let (environment, warnings) = load_environment(path)?;
-        loaded.scene.environment = Some(environment);
-        loaded.warnings.extend(warnings);
+    // A sky is for a scene that comes without light: one whose lights are turned off, or dimmed to nothing, is black. The
+    // sky is a light as others are, so that all are scaled at the end.
+    let is_dark = !has_light(&loaded.scene);
+    source.apply(&Settings { light_scale: None, ..settings.clone() }, &mut loaded)?;
+    if is_dark {
+        loaded.warnings.extend(add_default_light(&mut loaded.scene));
     }
-    source.apply(&settings, &mut loaded)?;
-    let Loaded { mut scene, mut warnings } = loaded;
-    warnings.extend(add_default_light(&mut scene));
+    source.apply(&Settings { light_scale: settings.light_scale, ..Settings::default() }, &mut loaded)?;
+    let Loaded { scene, warnings } = loaded;
     scene.check().with_context(|| source.name.clone())?;
-    let camera = camera(&scene, args.camera.as_deref())?;
-    let params = params(&settings, args, &camera)?;
+    let camera = scene.cameras[0].clone();
+    let params = params(settings, args, &camera)?;
     Ok(Input { scene, camera, params, warnings })
 }
 
@@ -199,17 +193,6 @@ pub fn size(settings: &Settings, camera: &Camera) -> [u32; 2] {
     }
 }
 
-/// The camera of that name or number; the first if none is named.
-fn camera(scene: &Scene, wanted: Option<&str>) -> Result<Camera> {
-    let Some(wanted) = wanted else { return Ok(scene.cameras[0].clone()) };
-    let by_name = scene.cameras.iter().find(|c| c.name == wanted);
-    let by_number = || wanted.parse().ok().and_then(|i: usize| scene.cameras.get(i));
-    by_name.or_else(by_number).cloned().with_context(|| {
-        let list: Vec<_> = scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} {:?}", c.name)).collect();
-        format!("no camera {wanted:?}; there is {}", list.join(", "))
-    })
-}
-
 /// Refuses a picture that could not be written later.
 #[cfg(feature = "view")]
 pub fn check_output(path: &Path) -> Result<()> {
@@ -249,7 +232,7 @@ fn check_outputs(args: &RenderArgs) -> Result<()> {
             bail!(Usage(format!("{} is to be written twice", path.display())));
         }
         let scene = args.scene.as_ref().map(PathBuf::from);
-        if scene.iter().chain(&args.input.env).any(|input| input.is_file() && same_file(input, path)) {
+        if scene.iter().chain(&args.env).any(|input| input.is_file() && same_file(input, path)) {
             bail!(Usage(format!("{} is read and to be written", path.display())));
         }
     }
@@ -260,10 +243,7 @@ fn check_outputs(args: &RenderArgs) -> Result<()> {
 }
 
 fn same_file(a: &Path, b: &Path) -> bool {
-    let place = |path: &Path| {
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        path.canonicalize().ok().or_else(|| Some(folder.canonicalize().ok()?.join(path.file_name()?)))
-    };
+    let place = |path: &Path| path.canonicalize().ok().or_else(|| place(path));
     a == b || place(a).is_some_and(|a| place(b).is_some_and(|b| a == b))
 }
 
@@ -373,8 +353,9 @@ mod tests {
         let sky = folder.path().join("sky.hdr");
         let pixels = image::ImageBuffer::from_pixel(2, 1, image::Rgb([1.0f32; 3]));
         image::DynamicImage::ImageRgb32F(pixels).save(&sky).unwrap();
-        let lit = InputArgs { env: Some(sky), ..InputArgs::default() };
-        let lit = prepare(&source, &settings, read.clone(), &lit).unwrap();
+        let mut lit = settings.clone();
+        lit.set(&format!("environment.file={}", sky.display())).unwrap();
+        let lit = prepare(&source, &lit, read.clone(), &args).unwrap();
         assert_eq!(lit.camera.pack(4, 3), cameras[0].pack(4, 3));
         let without = prepare(&source, &Settings::default(), read.clone(), &args).unwrap();
         assert_ne!(without.camera.pack(4, 3), cameras[0].pack(4, 3));

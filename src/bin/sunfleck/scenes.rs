@@ -89,14 +89,26 @@ impl Source {
         Ok(load(&self.file)?)
     }
 
-    /// Settings for a file that lies anywhere: what they name is found from there.
+    /// Settings as `file` is to hold them: what lies in its folder or below is named from there, so that the folder can be
+    /// moved; all else from the root.
     #[cfg(feature = "view")]
-    pub fn rooted(&self, settings: &Settings) -> Settings {
+    pub fn rooted(&self, settings: &Settings, file: &Path) -> Settings {
+        let there = place(file);
+        let folder = there.as_deref().and_then(Path::parent);
+        let named = |path: &Path| {
+            // A shipped scene has no place.
+            let place = path.exists().then(|| place(path)).flatten()?;
+            let Some(below) = folder.and_then(|folder| place.strip_prefix(folder).ok()) else {
+                return Some(place.to_string_lossy().into_owned());
+            };
+            // With slashes, which every system reads.
+            let parts: Vec<_> = below.iter().map(|part| part.to_string_lossy()).collect();
+            Some(parts.join("/"))
+        };
         let mut settings = settings.clone();
-        let absolute = |path: &Path| path.canonicalize().ok().map(|path| path.to_string_lossy().into_owned());
-        settings.scene = absolute(&self.file).or_else(|| Some(self.file.to_string_lossy().into_owned()));
+        settings.scene = named(&self.file).or_else(|| Some(self.file.to_string_lossy().into_owned()));
         if let Some(file) = settings.environment.as_mut().and_then(|environment| environment.file.as_mut()) {
-            *file = absolute(&self.folder.join(&*file)).unwrap_or_else(|| file.clone());
+            *file = named(&self.folder.join(&*file)).unwrap_or_else(|| file.clone());
         }
         settings
     }
@@ -126,6 +138,12 @@ impl Source {
         });
         Ok((environment, warnings))
     }
+}
+
+/// Where a file lies, from the root, if its folder is there. What is linked to lies where the link does.
+pub fn place(path: &Path) -> Option<PathBuf> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    Some(folder.canonicalize().ok()?.join(path.file_name()?))
 }
 
 /// Whether `scene` can be anything; if not, says what is near.
@@ -235,6 +253,35 @@ mod tests {
         assert_eq!(texel(), 2.0);
         std::fs::remove_file(&path).unwrap();
         assert!(source.environment(&path).is_err());
+    }
+
+    #[cfg(feature = "view")]
+    #[test]
+    fn saved_settings_move_with_their_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path().canonicalize().unwrap();
+        std::fs::create_dir_all(root.join("set/sky")).unwrap();
+        std::fs::write(root.join("set/a.toml"), "scene = \"a.glb\"\nenvironment = { file = \"sky/day.hdr\" }\n")
+            .unwrap();
+        for name in ["set/a.glb", "set/sky/day.hdr"] {
+            std::fs::write(root.join(name), "").unwrap();
+        }
+        let source = Source::resolve(&root.join("set/a.toml").to_string_lossy()).unwrap();
+        let absolute = |name: &str| root.join(name).to_string_lossy().into_owned();
+        for (file, scene, sky) in [
+            ("set/b.toml", "a.glb".to_owned(), "sky/day.hdr".to_owned()),
+            ("set/sky/../b.toml", "a.glb".to_owned(), "sky/day.hdr".to_owned()),
+            ("b.toml", "set/a.glb".to_owned(), "set/sky/day.hdr".to_owned()),
+            ("set/sky/b.toml", absolute("set/a.glb"), "day.hdr".to_owned()),
+            ("absent/b.toml", absolute("set/a.glb"), absolute("set/sky/day.hdr")),
+        ] {
+            let settings = source.rooted(&source.settings, &root.join(file));
+            assert_eq!(settings.scene, Some(scene), "{file}");
+            assert_eq!(settings.environment.and_then(|environment| environment.file), Some(sky), "{file}");
+        }
+        let shipped = Source::resolve("cornell").unwrap();
+        let settings = shipped.rooted(&shipped.settings, Path::new("b.toml"));
+        assert_eq!(settings.scene.as_deref(), Some("cornell"));
     }
 
     #[test]

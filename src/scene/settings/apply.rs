@@ -7,7 +7,7 @@ use super::{
 use crate::scene::load::load_environment;
 use crate::scene::{
     Camera, Environment, Material, Projection, PunctualKind, PunctualLight, Scene, Sphere,
-    defaults::{add_default_light, default_camera},
+    defaults::{add_default_light, default_camera, has_light},
 };
 use glam::{Affine3A, Vec3};
 use std::path::Path;
@@ -126,6 +126,7 @@ impl Settings {
         let wrong = |(field, problem): Wrong| SettingsError::Field { field, problem };
         self.check_values().map_err(wrong)?;
         self.add_default_camera(scene);
+        let is_dark = !has_light(scene);
         let mut warnings = Vec::new();
         for (i, material) in self.materials.iter().enumerate() {
             material.apply(&mut scene.materials, &format!("material[{i}]")).map_err(wrong)?;
@@ -138,7 +139,7 @@ impl Settings {
         }
         scene.lights.extend(self.lights.iter().enumerate().map(|(i, light)| light.light(i)));
         if let Some(environment) = &self.environment {
-            warnings.extend(environment.apply(scene, folder, read)?);
+            warnings.extend(environment.apply(scene, is_dark, folder, read)?);
         }
         if let Some(factor) = self.light_scale {
             scale_lights(scene, factor);
@@ -265,10 +266,11 @@ fn orient(position: Vec3, forward: Vec3, up: Vec3) -> Affine3A {
 }
 
 impl EnvironmentSettings {
-    /// Returns warnings.
+    /// `is_dark` says that the scene's file has no light. Returns warnings.
     fn apply(
         &self,
         scene: &mut Scene,
+        is_dark: bool,
         folder: &Path,
         read: &mut ReadEnvironment<'_>,
     ) -> Result<Vec<String>, SettingsError> {
@@ -281,8 +283,10 @@ impl EnvironmentSettings {
             }
             (None, Some(_)) => Environment::uniform(Vec3::ONE),
             (None, None) => {
-                // The sky that a scene without light gets is its own.
-                warnings.extend(add_default_light(scene));
+                // The sky that a scene without light gets is its own; one whose lights are turned off gets none.
+                if is_dark {
+                    warnings.extend(add_default_light(scene));
+                }
                 scene.environment.take().ok_or_else(|| SettingsError::Field {
                     field: "environment".into(),
                     problem: "neither file nor color is given, and the scene has no environment of its own".into(),

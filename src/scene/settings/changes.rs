@@ -130,33 +130,109 @@ impl SceneLightSettings {
 }
 
 impl Settings {
-    /// The changes to a material of `scene`, the scene as its file has it; an item is added if there is none.
+    /// The changes to a material of `scene`, the scene as its file has it; an item is added if there is none, and several
+    /// are made one that does the same.
     ///
     /// The material is meant by its name, or by its number where it shares its name or has none.
     pub fn material_mut(&mut self, scene: &Scene, index: usize) -> &mut MaterialSettings {
-        let name = own_name(scene.materials.iter().map(|material| material.name.as_str()), index);
-        let list = &mut self.materials;
-        let found = list.iter().rposition(|m| m.index == Some(index) || (name.is_some() && m.name == name));
-        let found = found.unwrap_or_else(|| {
-            let index = name.is_none().then_some(index);
-            list.push(MaterialSettings { name, index, ..MaterialSettings::default() });
-            list.len() - 1
-        });
-        &mut list[found]
+        only_item(&mut self.materials, scene.materials.iter().map(|material| material.name.as_str()), index)
     }
 
     /// The changes to a punctual light of `scene`; see [`Settings::material_mut`].
     pub fn scene_light_mut(&mut self, scene: &Scene, index: usize) -> &mut SceneLightSettings {
-        let name = own_name(scene.lights.iter().map(|light| light.name.as_str()), index);
-        let list = &mut self.scene_lights;
-        let found = list.iter().rposition(|m| m.index == Some(index) || (name.is_some() && m.name == name));
-        let found = found.unwrap_or_else(|| {
-            let index = name.is_none().then_some(index);
-            list.push(SceneLightSettings { name, index, ..SceneLightSettings::default() });
-            list.len() - 1
-        });
-        &mut list[found]
+        only_item(&mut self.scene_lights, scene.lights.iter().map(|light| light.name.as_str()), index)
     }
+}
+
+/// An item of a list of changes.
+trait Item {
+    fn new(name: Option<String>, index: Option<usize>) -> Self;
+    fn name(&self) -> Option<&str>;
+    fn index(&self) -> Option<usize>;
+    /// Becomes what changes a thing as this one does, and then `later`.
+    fn join(&mut self, later: Self);
+}
+
+impl Item for MaterialSettings {
+    fn new(name: Option<String>, index: Option<usize>) -> Self {
+        Self { name, index, ..Self::default() }
+    }
+
+    fn name(&self) -> Option<&str> {
+        self.name.as_deref()
+    }
+
+    fn index(&self) -> Option<usize> {
+        self.index
+    }
+
+    fn join(&mut self, later: Self) {
+        self.base_color = later.base_color.or(self.base_color);
+        self.metallic = later.metallic.or(self.metallic);
+        self.roughness = later.roughness.or(self.roughness);
+        self.transmission = later.transmission.or(self.transmission);
+        self.volume = later.volume.or(self.volume);
+        self.ior = later.ior.or(self.ior);
+        self.specular = later.specular.or(self.specular);
+        self.absorption = later.absorption.or(self.absorption);
+        // Another radiance comes without the factors on the one before.
+        self.emission_strength = match later.emission {
+            Some(_) => later.emission_strength,
+            None => product(self.emission_strength, later.emission_strength),
+        };
+        self.emission = later.emission.or(self.emission);
+    }
+}
+
+impl Item for SceneLightSettings {
+    fn new(name: Option<String>, index: Option<usize>) -> Self {
+        Self { name, index, ..Self::default() }
+    }
+
+    fn name(&self) -> Option<&str> {
+        self.name.as_deref()
+    }
+
+    fn index(&self) -> Option<usize> {
+        self.index
+    }
+
+    fn join(&mut self, later: Self) {
+        // What is off stays off.
+        self.on = if self.on == Some(false) { self.on } else { later.on.or(self.on) };
+        self.strength = product(self.strength, later.strength);
+        self.color = later.color.or(self.color);
+    }
+}
+
+fn product(a: Option<f32>, b: Option<f32>) -> Option<f32> {
+    a.zip(b).map(|(a, b)| a * b).or(a).or(b)
+}
+
+/// The item that changes the thing of that number and no other.
+///
+/// Several are joined as far back as there is none between them that changes this thing among others of its name.
+fn only_item<'n, T: Item>(list: &mut Vec<T>, names: impl Iterator<Item = &'n str> + Clone, index: usize) -> &mut T {
+    let name = names.clone().nth(index);
+    let own = own_name(names, index);
+    let is_own = |item: &T| item.index() == Some(index) || (own.is_some() && item.name() == own.as_deref());
+    let is_shared = |item: &T| item.name().is_some() && item.name() == name;
+    let Some(mut at) = list.iter().rposition(is_own) else {
+        let number = own.is_none().then_some(index);
+        list.push(T::new(own, number));
+        let last = list.len() - 1;
+        return &mut list[last];
+    };
+    for i in (0..at).rev() {
+        if is_own(&list[i]) {
+            let later = list.remove(at);
+            list[i].join(later);
+            at = i;
+        } else if is_shared(&list[i]) {
+            break;
+        }
+    }
+    &mut list[at]
 }
 
 /// The name of that number, if there is one and no other has it.

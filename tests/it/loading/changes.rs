@@ -188,6 +188,46 @@ fn changes_are_found_again() {
     assert_eq!((changed.materials[2].roughness, changed.materials[3].roughness), (0.25, scene.materials[3].roughness));
 }
 
+/// What is shown of a thing is what all items do to it, and an edit is over them all.
+#[test]
+fn several_changes_of_one_thing_become_one() {
+    let scene = scene();
+    let text = "\
+        [[material]]\nindex = 0\nroughness = 0.25\nior = 2\nemission = [1, 2, 3]\nemission_strength = 5\n\
+        [[material]]\nindex = 2\nroughness = 0.5\n\
+        [[material]]\nname = \"floor\"\nmetallic = 1\nior = 3\nemission_strength = 2\n\
+        [[material]]\nindex = 0\nvolume = true\nemission_strength = 0.5\n\
+        [[scene_light]]\nname = \"sun\"\nstrength = 4\non = false\n\
+        [[scene_light]]\nindex = 1\nstrength = 0.5\non = true\ncolor = [1, 0, 0]\n";
+    let file = parse(text);
+    let mut settings = file.clone();
+    let floor = settings.material_mut(&scene, 0).clone();
+    assert_eq!(
+        (floor.roughness, floor.metallic, floor.ior, floor.volume),
+        (Some(0.25), Some(1.0), Some(3.0), Some(true))
+    );
+    assert_eq!((floor.emission, floor.emission_strength), (Some([1.0, 2.0, 3.0]), Some(5.0)));
+    let sun = settings.scene_light_mut(&scene, 1).clone();
+    assert_eq!((sun.strength, sun.on, sun.color), (Some(2.0), Some(false), Some([1.0, 0.0, 0.0])));
+    assert_eq!((settings.materials.len(), settings.scene_lights.len()), (2, 1));
+    let changed = |settings: &Settings| {
+        let Scene { materials, lights, .. } = apply(settings);
+        format!("{materials:?} {lights:?}")
+    };
+    assert_eq!(changed(&settings), changed(&file));
+    settings.material_mut(&scene, 0).roughness = Some(0.75);
+    assert_eq!(apply(&settings).materials[0].roughness, 0.75);
+    // What changes others as well keeps its place among them.
+    let name = scene.materials[2].name.clone();
+    let text = "[[material]]\nindex = 2\nroughness = 0.25\n[[material]]\nname = NAME\nroughness = 0.5\n\
+        [[material]]\nindex = 2\nmetallic = 1\n[[material]]\nindex = 2\nior = 2\n";
+    let file = parse(&text.replace("NAME", &format!("{name:?}")));
+    let mut settings = file.clone();
+    let twin = settings.material_mut(&scene, 2).clone();
+    assert_eq!((twin.metallic, twin.ior, settings.materials.len()), (Some(1.0), Some(2.0), 3));
+    assert_eq!(changed(&settings), changed(&file));
+}
+
 #[test]
 fn text_is_short() {
     let mut settings = Settings { alpha: Some(0.3), seconds: Some(0.1), ..Settings::default() };

@@ -47,8 +47,7 @@ impl First {
         if let Some(path) = &args.output {
             crate::job::check_output(path)?;
         }
-        let mut set = args.set.clone();
-        set.extend(args.pairs()?);
+        let set = args.pairs()?;
         let always = args.device.pairs();
         let choice = match &args.scene {
             Some(name) => Some(Choice { name: name.clone(), set: [set, always.clone()].concat() }),
@@ -312,9 +311,9 @@ impl Viewer {
         self.move_rig(time, &mut |rig| rig.frame_all(bounds, width as f32 / height as f32));
     }
 
-    /// The settings as a file holds them.
-    pub fn settings_text(&self) -> Option<String> {
-        Some(self.editing.as_ref()?.source.rooted(self.edits.now()).to_toml())
+    /// The settings as `file` is to hold them.
+    pub fn settings_text(&self, file: &Path) -> Option<String> {
+        Some(self.editing.as_ref()?.source.rooted(self.edits.now(), file).to_toml())
     }
 
     /// What renders this picture on the command line.

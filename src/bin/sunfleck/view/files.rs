@@ -222,7 +222,7 @@ pub fn dropped(ui: &egui::Ui, viewer: &mut Viewer, paths: &[PathBuf]) {
 
 /// The settings as the command line reads them.
 fn save_settings(ui: &egui::Ui, viewer: &mut Viewer, path: &Path) {
-    let Some(text) = viewer.settings_text() else { return };
+    let Some(text) = viewer.settings_text(path) else { return };
     let written = sunfleck::output::atomic::write(path, |writer| std::io::Write::write_all(writer, text.as_bytes()));
     let message = match written {
         Ok(()) => Message::Said(format!("saved {}", path.display())),

@@ -187,7 +187,7 @@ fn how_the_picture_is_shown_can_be_undone_and_is_told() {
     window.step();
     let command = window.viewer().command().unwrap();
     assert!(command.contains(" --set exposure=1.25 ") && command.contains(" --set tonemap=agx "), "{command}");
-    let text = window.viewer().settings_text().unwrap();
+    let text = window.viewer().settings_text("a.toml".as_ref()).unwrap();
     assert!(text.contains("exposure = 1.25\n") && text.contains("tonemap = \"agx\"\n"), "{text}");
     window.wait("shown", |viewer| viewer.picture.painted().is_some_and(|painted| painted.exposure == 1.25));
     while window.viewer().edits.can_undo() {

@@ -289,7 +289,7 @@ fn how_to_search_is_a_setting_that_can_be_undone() {
     assert_eq!(frame.scene.accelerator(), Accelerator::Kd);
     let command = window.viewer().command().unwrap();
     assert!(command.contains(" --set accel=kd ") && command.matches("accel").count() == 1, "{command}");
-    assert!(window.viewer().settings_text().unwrap().contains("accel = \"kd\"\n"));
+    assert!(window.viewer().settings_text("a.toml".as_ref()).unwrap().contains("accel = \"kd\"\n"));
     window.press(Modifiers::COMMAND, Key::Z);
     assert_eq!(accel(&mut window), None);
     window.press(Modifiers::COMMAND, Key::Y);
