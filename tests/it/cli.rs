@@ -1,5 +1,6 @@
 //! The program as its users meet it: what it prints, what it writes, how it exits.
 
+mod compare;
 mod devices;
 
 use std::f32::consts::FRAC_1_SQRT_2;

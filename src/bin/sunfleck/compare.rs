@@ -16,12 +16,13 @@ pub fn run(args: &CompareArgs) -> Result<ExitCode> {
         crate::print(&serde_json::to_string_pretty(&d)?);
         return Ok(ExitCode::SUCCESS);
     }
+    let relative = d.relative_mean_difference.map(|share| format!("{:+.4} %", 100.0 * share));
     crate::print(&format!(
-        "relMSE             {}\nrelMSE, trimmed    {}\nmean difference    {} ({:+.4} %)\nlargest difference {}",
+        "relMSE             {}\nrelMSE, trimmed    {}\nmean difference    {} ({})\nlargest difference {}",
         digits(d.rel_mse),
         digits(d.rel_mse_trimmed),
         digits(d.mean_difference),
-        100.0 * d.relative_mean_difference,
+        relative.unwrap_or_else(|| "–".into()),
         digits(d.max_difference),
     ));
     if d.not_finite > 0 {
