@@ -12,6 +12,8 @@
 //! | `alpha`, `firstRadius`, `lastRadius` | float | metres; the median where each pixel has its own |
 //! | `renderTimeSeconds` | float | from the first iteration to the last |
 //! | `capDate`, `utcOffset` | | when it was saved, UTC |
+//! | `screenWindowWidth` | float | what the whole picture is wide: at distance 1; metres if orthographic |
+//! | `projection` | string | `perspective` or `orthographic` |
 //! | `worldToCamera` | m44f | row vectors, as in Imath: p·M; +x right, +y up, looking along −z |
 //!
 //! Channels: `R`, `G`, `B`, and on request `Variance.Y`, the estimated variance of the pixel's luminance.
@@ -102,6 +104,7 @@ fn layer_attributes(picture: &Picture, header: &Header) -> LayerAttributes {
     // OpenEXR's strings are UTF-8; the crate's checked constructors refuse all but Latin-1.
     let text = |s: &str| Text::from_slice_unchecked(s.as_bytes());
     let count = |n: u32| i32::try_from(n).map_or(AttributeValue::F64(f64::from(n)), AttributeValue::I32);
+    let projection = if header.camera.orthographic == 1 { "orthographic" } else { "perspective" };
     let other: HashMap<Text, AttributeValue> = [
         ("sunfleckVersion", AttributeValue::Text(text(VERSION))),
         ("scene", AttributeValue::Text(text(&header.scene))),
@@ -109,6 +112,7 @@ fn layer_attributes(picture: &Picture, header: &Header) -> LayerAttributes {
         ("adapter", AttributeValue::Text(text(&header.adapter))),
         ("index", AttributeValue::Text(text(&header.index))),
         ("accelerator", AttributeValue::Text(text(&header.accelerator))),
+        ("projection", AttributeValue::Text(text(projection))),
         ("seed", count(header.seed)),
         ("iterations", count(header.iterations)),
         ("samplesPerPixel", count(header.iterations)),
@@ -125,6 +129,8 @@ fn layer_attributes(picture: &Picture, header: &Header) -> LayerAttributes {
         software_name: Some(text(&format!("Sunfleck {VERSION}"))),
         capture_date: Some(text(&utc_date(SystemTime::now()))),
         utc_offset: Some(0.0),
+        // Of the display window, whatever part of it was computed.
+        screen_window_width: 2.0 * header.camera.half_width,
         world_to_camera: Some(camera_from_world(&header.camera).to_cols_array()),
         other,
         ..LayerAttributes::default()

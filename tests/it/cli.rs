@@ -2,6 +2,7 @@
 
 mod compare;
 mod devices;
+mod headers;
 
 use std::f32::consts::FRAC_1_SQRT_2;
 use std::fs;
