@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use exr::meta::attribute::IntegerBounds;
+use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage};
 use sunfleck::output::Picture;
 use sunfleck::output::exr::{Header, write};
 
@@ -32,4 +34,31 @@ fn what_cannot_be_told_is_not_told_as_0() {
     let output = sunfleck(folder, words("compare grey.exr black.exr --json"));
     let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert!(json["relativeMeanDifference"].is_null() && json["meanDifference"] == 0.5, "{json} {}", stderr(&output));
+}
+
+/// 20×10 pixels, of which the file has these.
+fn save_part(folder: &Path, name: &str, at: (i32, i32), size: (usize, usize)) {
+    let channel = |name| AnyChannel::new(name, FlatSamples::F32(vec![0.5; size.0 * size.1]));
+    let channels = AnyChannels::sort(["Combined.R", "Combined.G", "Combined.B"].map(channel).into_iter().collect());
+    let attributes = LayerAttributes { layer_position: at.into(), ..LayerAttributes::default() };
+    let mut image = Image::from_layer(Layer::new(size, attributes, Encoding::default(), channels));
+    image.attributes.display_window = IntegerBounds::from_dimensions((20, 10));
+    image.write().to_file(folder.join(name)).unwrap();
+}
+
+#[test]
+fn overscan_is_cut_and_a_part_is_told_as_the_file_has_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    save_part(folder, "whole.exr", (0, 0), (20, 10));
+    save_part(folder, "overscan.exr", (-8, -8), (36, 26));
+    save_part(folder, "part.exr", (-8, -8), (20, 26));
+    let output = sunfleck(folder, words("compare overscan.exr whole.exr"));
+    let text = String::from_utf8(output.stdout.clone()).unwrap();
+    assert!(output.status.success() && text.contains("relMSE             0.000000"), "{text}{}", stderr(&output));
+    let windows =
+        "the windows differ: 20x10 with data from (0, 0) to (12, 10) and 20x10 with data from (0, 0) to (20, 10)";
+    let output = sunfleck(folder, words("compare part.exr whole.exr"));
+    assert_error(&output, 1, &[windows, "the file part.exr has data from (-8, -8) to (12, 18)"]);
+    assert!(!stderr(&output).contains("the file whole.exr"));
 }
