@@ -43,8 +43,8 @@ impl Measure {
 pub struct Image {
     /// `[h·w]` over the crop, row-major; NaN where either picture has a value that is not finite.
     pub values: Vec<f32>,
-    /// Over the pixels that are finite; 0 if there are none.
-    pub mean: f64,
+    /// Over the pixels that are finite, if there are any.
+    pub mean: Option<f64>,
 }
 
 /// The difference of two pictures of the same size and crop; otherwise says what differs.
@@ -62,7 +62,7 @@ pub fn image(picture: &Picture, reference: &Picture, measure: Measure) -> Result
         sum += f64::from(*v);
         n += 1;
     }
-    Ok(Image { values, mean: sum / n.max(1) as f64 })
+    Ok(Image { values, mean: (n > 0).then(|| sum / n as f64) })
 }
 
 #[cfg(test)]
@@ -78,7 +78,7 @@ mod tests {
     #[test]
     fn closed_values() {
         let (x, y) = (picture(vec![[3.0, 1.0, 0.0]]), picture(vec![[1.0, 2.0, 0.0]]));
-        let mean = |m| image(&x, &y, m).unwrap().mean;
+        let mean = |m| image(&x, &y, m).unwrap().mean.unwrap();
         assert!((mean(Measure::Absolute) - 1.0).abs() < 1e-7);
         assert!((mean(Measure::Squared) - 5.0 / 3.0).abs() < 1e-6);
         assert!((mean(Measure::Relative) - (2.0 / 1.01 + 1.0 / 2.01) / 3.0).abs() < 1e-6);
@@ -95,16 +95,17 @@ mod tests {
         x.rgb[4] = [f32::INFINITY, 1.0, 1.0];
         let figures = compare(&x, &y).unwrap();
         let relative = image(&x, &y, Measure::RelativeSquared).unwrap();
-        assert!((relative.mean / figures.rel_mse - 1.0).abs() < 1e-6, "{} {}", relative.mean, figures.rel_mse);
+        let mean = relative.mean.unwrap();
+        assert!((mean / figures.rel_mse - 1.0).abs() < 1e-6, "{mean} {}", figures.rel_mse);
         assert!(relative.values[3].is_nan() && relative.values[4].is_nan() && relative.values[5].is_finite());
         let signed = image(&x, &y, Measure::Signed).unwrap();
-        assert!((signed.mean - figures.mean_difference).abs() < 1e-7);
+        assert!((signed.mean.unwrap() - figures.mean_difference).abs() < 1e-7);
     }
 
     #[test]
-    fn other_sizes_are_refused_and_nothing_finite_is_no_difference() {
+    fn other_sizes_are_refused_and_nothing_finite_has_no_mean() {
         let a = picture(vec![[f32::NAN; 3]; 2]);
         assert!(image(&a, &picture(vec![[0.0; 3]; 3]), Measure::Absolute).unwrap_err().contains("windows differ"));
-        assert_eq!(image(&a, &a, Measure::Squared).unwrap().mean, 0.0);
+        assert_eq!(image(&a, &a, Measure::Squared).unwrap().mean, None);
     }
 }

@@ -14,15 +14,16 @@ pub const PIXELS_PER_DEGREE: f32 = 67.02;
 /// What ꟻLIP finds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Flip {
-    /// 0, no difference, to 1, the largest; `[h·w]`, row-major.
+    /// 0, no difference, to 1, the largest; `[h·w]`, row-major; NaN where either picture is not finite.
     pub error: Vec<f32>,
-    /// Of the errors.
-    pub mean: f64,
+    /// Of the errors that are finite, if there are any.
+    pub mean: Option<f64>,
 }
 
 /// Compares two pictures of `size` (width, height) as a display shows them: linear RGB with the sRGB primaries in
-/// [0, 1], `[h·w]`, row-major ([`super::display::linear`]); what is outside is cut off, NaN counts as 0. The order of the
-/// two does not matter. `pixels_per_degree` of visual angle, above 0: [`PIXELS_PER_DEGREE`].
+/// [0, 1], `[h·w]`, row-major ([`super::display::linear`]); what is outside is cut off. The order of the two does not
+/// matter. A pixel that is not finite in either is left out: to its neighbours it is black in both. `pixels_per_degree`
+/// of visual angle, above 0: [`PIXELS_PER_DEGREE`].
 ///
 /// Says what is wrong if a picture is not of that size, or `pixels_per_degree` not in [1, 1000].
 pub fn flip(x: &[[f32; 3]], y: &[[f32; 3]], size: [usize; 2], pixels_per_degree: f32) -> Result<Flip, String> {
@@ -39,14 +40,19 @@ pub fn flip(x: &[[f32; 3]], y: &[[f32; 3]], size: [usize; 2], pixels_per_degree:
     }
     let filters = Filters::new(f64::from(pixels_per_degree));
     let space = Space::new();
-    let planes = [x, y].map(|rgb| Planes::new(rgb, &space));
+    let finite: Vec<bool> = x.iter().zip(y).map(|(x, y)| x.iter().chain(y).all(|c| c.is_finite())).collect();
+    let planes = [x, y].map(|rgb| Planes::new(rgb, &finite, &space));
     let mut error = vec![0.0; x.len()];
     error.par_chunks_mut(width).enumerate().for_each_init(
         || (Row::default(), Row::default(), Vec::new()),
         |(a, b, scratch), (at, error)| {
             a.filter(&planes[0], &filters, width, at, scratch);
             b.filter(&planes[1], &filters, width, at, scratch);
-            for (i, error) in error.iter_mut().enumerate() {
+            for (i, (error, &finite)) in error.iter_mut().zip(&finite[at * width..]).enumerate() {
+                if !finite {
+                    *error = f32::NAN;
+                    continue;
+                }
                 let colour = space.colour_difference(a.opponent(i), b.opponent(i));
                 let edges = (a.edges(i) - b.edges(i)).abs().max((a.points(i) - b.points(i)).abs());
                 let feature = (edges * std::f32::consts::FRAC_1_SQRT_2).clamp(0.0, 1.0).sqrt();
@@ -54,8 +60,9 @@ pub fn flip(x: &[[f32; 3]], y: &[[f32; 3]], size: [usize; 2], pixels_per_degree:
             }
         },
     );
-    let mean = error.iter().map(|e| f64::from(*e)).sum::<f64>() / error.len() as f64;
-    Ok(Flip { error, mean })
+    let n = finite.iter().filter(|finite| **finite).count();
+    let sum: f64 = error.iter().filter(|e| !e.is_nan()).map(|e| f64::from(*e)).sum();
+    Ok(Flip { error, mean: (n > 0).then(|| sum / n as f64) })
 }
 
 /// Taps of the filters; each is symmetric about its middle tap, or antisymmetric (`edge`).
@@ -136,7 +143,7 @@ impl Space {
 
     /// YCₓC_z, "linearised CIELAB", of linear RGB.
     fn opponent(&self, rgb: [f32; 3]) -> [f32; 3] {
-        let rgb = Vec3::from(rgb.map(|c| if c > 0.0 { c.min(1.0) } else { 0.0 }));
+        let rgb = Vec3::from(rgb.map(|c| c.clamp(0.0, 1.0)));
         let [x, y, z] = (self.from_rgb.as_mat3() * rgb).to_array();
         [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
     }
@@ -186,8 +193,9 @@ struct Planes {
 }
 
 impl Planes {
-    fn new(rgb: &[[f32; 3]], space: &Space) -> Self {
-        let pixels: Vec<_> = rgb.par_iter().map(|&rgb| space.opponent(rgb)).collect();
+    fn new(rgb: &[[f32; 3]], finite: &[bool], space: &Space) -> Self {
+        let pixel = |(&rgb, &finite)| space.opponent(if finite { rgb } else { [0.0; 3] });
+        let pixels: Vec<_> = rgb.par_iter().zip(finite).map(pixel).collect();
         let plane = |c: usize| pixels.iter().map(|p| p[c]).collect();
         let grey = pixels.iter().map(|p| (p[0] + 16.0) / 116.0).collect();
         Self { opponent: [plane(0), plane(1), plane(2)], grey }
@@ -297,7 +305,8 @@ mod tests {
         ];
         for (pixels_per_degree, mean, errors) in theirs {
             let ours = flip(&synthetic(0), &synthetic(1), SIZE, pixels_per_degree).unwrap();
-            assert!((ours.mean - mean).abs() < 1e-3, "{} instead of {mean}", ours.mean);
+            let our_mean = ours.mean.unwrap();
+            assert!((our_mean - mean).abs() < 1e-3, "{our_mean} instead of {mean}");
             for ((x, y), error) in places.into_iter().zip(errors) {
                 let ours = ours.error[y * 48 + x];
                 assert!((ours - error).abs() < 1e-3f32, "({x}, {y}): {ours} instead of {error}");
@@ -312,12 +321,35 @@ mod tests {
         let back = flip(&y, &x, SIZE, PIXELS_PER_DEGREE).unwrap();
         assert!(there.error.iter().zip(&back.error).all(|(a, b)| (a - b).abs() < 1e-6));
         assert!(there.error.iter().all(|e| (0.0..=1.0).contains(e)));
-        assert_eq!(flip(&x, &x, SIZE, PIXELS_PER_DEGREE).unwrap().mean, 0.0);
+        assert_eq!(flip(&x, &x, SIZE, PIXELS_PER_DEGREE).unwrap().mean, Some(0.0));
+    }
+
+    #[test]
+    fn what_is_not_finite_is_left_out_and_does_not_spread() {
+        let (x, y) = (synthetic(0), synthetic(1));
+        let all = flip(&x, &y, SIZE, PIXELS_PER_DEGREE).unwrap();
+        let (at, beside) = (20 * 48 + 30, 20 * 48 + 31);
+        for broken in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let mut wild = x.clone();
+            wild[at][1] = broken;
+            let same = flip(&wild, &x, SIZE, PIXELS_PER_DEGREE).unwrap();
+            assert!(same.error[at].is_nan() && same.mean == Some(0.0), "{broken}: {:?}", same.mean);
+            let there = flip(&wild, &y, SIZE, PIXELS_PER_DEGREE).unwrap();
+            assert_eq!(there.error.iter().filter(|e| e.is_nan()).count(), 1);
+            assert!(
+                there.error[at].is_nan() && there.error[0] == all.error[0] && there.error[beside] != all.error[beside]
+            );
+            let kept: Vec<f64> = there.error.iter().filter(|e| !e.is_nan()).map(|e| f64::from(*e)).collect();
+            let mean = kept.iter().sum::<f64>() / kept.len() as f64;
+            assert!((there.mean.unwrap() - mean).abs() < 1e-12);
+        }
+        let none = flip(&[[f32::NAN; 3]; 6], &[[0.5; 3]; 6], [3, 2], PIXELS_PER_DEGREE).unwrap();
+        assert!(none.mean.is_none() && none.error.iter().all(|e| e.is_nan()));
     }
 
     #[test]
     fn odd_values_and_sizes() {
-        let wild = [[f32::NAN, f32::INFINITY, -4.0], [0.0; 3], [f32::MAX; 3], [1.0; 3]];
+        let wild = [[-1e30, f32::MAX, -4.0], [0.0; 3], [f32::MAX; 3], [1.0; 3]];
         let tame = [[0.0, 1.0, 0.0], [0.0; 3], [1.0; 3], [1.0; 3]];
         for size in [[4, 1], [1, 4], [2, 2]] {
             assert_eq!(flip(&wild, &tame, size, 1.0).unwrap().error, [0.0; 4]);

@@ -1,6 +1,8 @@
 //! The program as its users meet it: what it prints, what it writes, how it exits.
 
+mod compare;
 mod devices;
+mod headers;
 mod settings;
 
 use std::f32::consts::FRAC_1_SQRT_2;

@@ -16,7 +16,7 @@ const ALLOWED: [(&str, &[&str]); 13] = [
     ("cpu", &["ppm", "scene", "layout", "device", "index", "math"]),
     ("gpu", &["ppm", "scene", "layout", "device", "index", "math"]),
     ("inspect", &["cpu", "ppm", "scene", "layout", "index", "math"]),
-    ("output", &["ppm", "scene", "layout", "index", "math"]),
+    ("output", &["files", "ppm", "scene", "layout", "index", "math"]),
 ];
 
 fn sources(path: &Path, into: &mut Vec<(String, String)>) {

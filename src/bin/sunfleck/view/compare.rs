@@ -185,14 +185,27 @@ pub fn section(ui: &mut egui::Ui, viewer: &mut Viewer) {
     table(ui, "figures", |ui| {
         let number = |v: f64| short(v as f32);
         row(ui, "relMSE", figures.map(|f| number(f.rel_mse)), "Mean of (x − y)² / (y² + 0.01)");
+        let trimmed = figures.map(|f| number(f.rel_mse_trimmed));
+        row(
+            ui,
+            "relMSE, trimmed",
+            trimmed,
+            "The same without the worst 0.1 % of the pixels: what is left when fireflies are",
+        );
         row(
             ui,
             "Mean x − y",
             figures.map(|f| number(f.mean_difference)),
             "Above 0: the picture is brighter, W/(m² sr)",
         );
-        let relative = figures.map(|f| format!("{} %", number(100.0 * f.relative_mean_difference)));
+        let share = figures.and_then(|f| f.relative_mean_difference);
+        let relative = share.map(|share| format!("{} %", number(100.0 * share)));
         row(ui, "Relative to y", relative, "Mean of x − y over the mean of y");
+        row(ui, "Largest difference", figures.map(|f| number(f.max_difference)), "Largest |x − y|, W/(m² sr)");
+        if let Some(f) = figures.filter(|f| f.not_finite > 0) {
+            let text = format!("{} of {}", f.not_finite, f.not_finite + f.pixels);
+            row(ui, "Not finite", Some(text), "Pixels left out, not finite in the picture or in the reference");
+        }
         let shown = painted.and_then(|painted| Some((painted.painting.comparison, painted.mean?)));
         let flip = shown.filter(|(comparison, _)| *comparison == Comparison::Flip);
         row(ui, "FLIP", flip.map(|(_, mean)| number(mean)), "Mean; measured while FLIP is shown");

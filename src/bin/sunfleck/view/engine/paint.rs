@@ -441,13 +441,20 @@ fn compared(
         }
         Comparison::Flip => {
             let size = picture.crop_size();
-            let [x, y] = [picture, reference].map(|p| display::linear(&p.rgb, exposure, painting.look.tonemap));
+            let [x, y] = [picture, reference].map(|p| {
+                let mut shown = display::linear(&p.rgb, exposure, painting.look.tonemap);
+                // A display shows a colour even there; a comparison leaves it out.
+                for (shown, _) in shown.iter_mut().zip(&p.rgb).filter(|(_, rgb)| !rgb.iter().all(|c| c.is_finite())) {
+                    *shown = [f32::NAN; 3];
+                }
+                shown
+            });
             let flip = flip(&x, &y, size, flip::PIXELS_PER_DEGREE)?;
             let range = false_colour::scalar(&flip.error, &Scale { range: Some([0.0, 1.0]), log: false }, &mut rgba);
             (flip.error, Legend { range, log: false, signed: false }, flip.mean)
         }
     };
-    Ok(Some(Colours { rgba, values: Values::Scalar(Arc::new(values)), legend: Some(legend), mean: Some(mean) }))
+    Ok(Some(Colours { rgba, values: Values::Scalar(Arc::new(values)), legend: Some(legend), mean }))
 }
 
 /// Numbers in false colour.

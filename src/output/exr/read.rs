@@ -1,0 +1,420 @@
+//! Pictures of any program: which of a file's channels are the picture, and which of its pixels.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+use ::exr::error::Error as Problem;
+use ::exr::image::read::specific_channels::ReadSpecificChannel;
+use ::exr::meta::MetaData;
+use ::exr::meta::attribute::Text;
+use ::exr::meta::header::Header;
+use ::exr::prelude::{ReadChannels, ReadLayers, Vec2};
+
+use crate::files::shorten;
+use crate::output::{Error, Picture};
+
+/// Largest picture that [`read`] takes, pixels: 3 GiB of linear RGB.
+pub const MAX_READ_PIXELS: u64 = 1 << 28;
+/// A block, all channels of some rows or of a tile, is decoded as a whole, one on each thread.
+const MAX_BLOCK_BYTES: usize = 1 << 30;
+/// Every OpenEXR file begins with these.
+const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+
+/// Reads a picture in full size, whoever wrote it, as far as it is in the display window.
+///
+/// It is in the first part with channels `R`, `G` and `B`. If there is none, it is the one layer that has them, as in
+/// `Combined.R`, in either case, or `Y` as grey; of several layers, the one whose name ends in "Combined" or "beauty",
+/// which renderers call the sum of their passes.
+pub fn read(path: &Path) -> Result<Picture, Error> {
+    let fail = |reason: &dyn std::fmt::Display| Error::read(path, reason);
+    let meta = meta(path)?;
+    let (header, channels) = choose(&meta.headers).map_err(|e| fail(&e))?;
+    let [x, y, right, bottom] = window(header);
+    let display = header.shared_attributes.display_window;
+    // Counted from the corner of the display window.
+    let columns = Visible::new(x - i64::from(display.position.0), header.layer_size.0, display.size.0);
+    let rows = Visible::new(y - i64::from(display.position.1), header.layer_size.1, display.size.1);
+    let (Some(columns), Some(rows)) = (columns, rows) else {
+        return Err(fail(&format_args!(
+            "its data window, ({x}, {y}) to ({right}, {bottom}), is outside of its display window, {}x{} from ({}, {})",
+            display.size.0, display.size.1, display.position.0, display.position.1
+        )));
+    };
+
+    let new = || Plane::new(columns, rows);
+    let file = BufReader::new(File::open(path).map_err(|e| fail(&e))?);
+    let wanted = ::exr::prelude::read().no_deep_data().largest_resolution_level().specific_channels();
+    let plane = match channels {
+        Channels::Rgb([r, g, b]) => wanted
+            .required(r)
+            .required(g)
+            .required(b)
+            .collect_pixels(|_, _| new(), |plane: &mut Plane, at, (r, g, b): (f32, f32, f32)| plane.set(at, [r, g, b]))
+            .first_valid_layer()
+            .all_attributes()
+            .from_buffered(file)
+            .map(|image| image.layer_data.channel_data.pixels),
+        Channels::Grey(y) => wanted
+            .required(y)
+            .collect_pixels(|_, _| new(), |plane: &mut Plane, at, (y,): (f32,)| plane.set(at, [y; 3]))
+            .first_valid_layer()
+            .all_attributes()
+            .from_buffered(file)
+            .map(|image| image.layer_data.channel_data.pixels),
+    };
+    let rgb = plane.map_err(|e| fail(&e))?.rgb;
+    let size = [display.size.0 as u32, display.size.1 as u32];
+    Ok(Picture { size, crop: [columns.from, rows.from, columns.to, rows.to], rgb, variance: None })
+}
+
+/// What part of the plane the file has the picture in, in its own coordinates, whether displayed or not: x0, y0, x1, y1
+/// (exclusive).
+pub fn data_window(path: &Path) -> Result<[i64; 4], Error> {
+    let meta = meta(path)?;
+    let (header, _) = choose(&meta.headers).map_err(|e| Error::read(path, e))?;
+    Ok(window(header))
+}
+
+/// All headers, none of which asks for too much memory.
+fn meta(path: &Path) -> Result<MetaData, Error> {
+    let fail = |reason: &dyn std::fmt::Display| Error::read(path, reason);
+    let kind = std::fs::metadata(path).map_err(|e| fail(&e))?;
+    if !kind.is_file() {
+        return Err(fail(&"not a regular file"));
+    }
+    let mut begin = [0; 4];
+    if File::open(path).and_then(|mut file| file.read_exact(&mut begin)).is_ok() && begin != MAGIC {
+        return Err(fail(&"not an OpenEXR file"));
+    }
+    let meta = MetaData::read_from_file(path, false).map_err(|e: Problem| fail(&e))?;
+    for header in &meta.headers {
+        let pixels = header.layer_size.0 as u64 * header.layer_size.1 as u64;
+        if pixels > MAX_READ_PIXELS {
+            return Err(fail(&format_args!("{pixels} pixels, more than {MAX_READ_PIXELS}")));
+        }
+        let block = header.max_block_pixel_size();
+        let bytes = block.0.checked_mul(block.1).and_then(|n| n.checked_mul(header.channels.bytes_per_pixel));
+        if bytes.is_none_or(|n| n > MAX_BLOCK_BYTES) || header.chunk_count as u64 > kind.len() {
+            return Err(fail(&"its blocks are too large, or more than it can have"));
+        }
+    }
+    Ok(meta)
+}
+
+/// What a picture is made of.
+#[derive(Debug)]
+enum Channels {
+    Rgb([Text; 3]),
+    Grey(Text),
+}
+
+/// The part and its channels that are the picture: always the first part that has these channels.
+fn choose(headers: &[Header]) -> Result<(&Header, Channels), String> {
+    let parts = || headers.iter().filter(|header| !header.deep);
+    if parts().next().is_none() {
+        return Err("it has only deep data".into());
+    }
+    let find = |header: &Header, name: &str| {
+        let is_named = |c: &&Text| c.as_slice().eq_ignore_ascii_case(name.as_bytes());
+        header.channels.list.iter().map(|c| &c.name).find(is_named).cloned()
+    };
+    let plain = ["R", "G", "B"];
+    let has = |header: &Header, name: &str| header.channels.list.iter().any(|c| c.name == *name);
+    if let Some(header) = parts().find(|header| plain.iter().all(|name| has(header, name))) {
+        return Ok((header, Channels::Rgb(plain.map(Text::from))));
+    }
+
+    let mut layers: BTreeMap<String, (&Header, Channels)> = BTreeMap::new();
+    for header in parts() {
+        for (name, channels) in triples(header) {
+            layers.entry(name).or_insert((header, Channels::Rgb(channels)));
+        }
+    }
+    if let Some(found) = layers.remove("") {
+        return Ok(found);
+    }
+    // With chroma it is not grey, and with X no luminance.
+    let is_grey = |header: &&Header| ["X", "RY", "BY"].iter().all(|name| find(header, name).is_none());
+    let luminance = parts().find_map(|header| Some((header, find(header, "Y")?)));
+    if let Some((header, y)) = luminance.filter(|(header, _)| is_grey(header)) {
+        layers.entry("Y".into()).or_insert((header, Channels::Grey(y)));
+    }
+    if layers.len() > 1 {
+        let is_sum = |name: &String| ["combined", "beauty"].iter().any(|end| name.to_lowercase().ends_with(end));
+        let names: Vec<String> = layers.keys().cloned().collect();
+        layers.retain(|name, _| is_sum(name));
+        if layers.len() != 1 {
+            let names = listed(names.iter().map(String::as_str));
+            return Err(format!(
+                "several layers could be the picture, and no single one is called Combined or beauty: {names}"
+            ));
+        }
+    }
+    layers.into_values().next().ok_or_else(|| {
+        let names: Vec<_> =
+            parts().flat_map(|header| &header.channels.list).map(|c| lossy(c.name.as_slice())).collect();
+        format!("it has no channels R, G and B, plain or of a layer, but {}", listed(names.iter().map(String::as_str)))
+    })
+}
+
+/// The layers of a part that have red, green and blue.
+fn triples(header: &Header) -> impl Iterator<Item = (String, [Text; 3])> {
+    let mut layers: BTreeMap<&[u8], [Option<&Text>; 3]> = BTreeMap::new();
+    for name in header.channels.list.iter().map(|c| &c.name) {
+        let (layer, channel) = match name.as_slice().iter().rposition(|&byte| byte == b'.') {
+            Some(dot) => (&name.as_slice()[..dot], &name.as_slice()[dot + 1..]),
+            None => (&[][..], name.as_slice()),
+        };
+        if let Some(i) = ["R", "G", "B"].iter().position(|c| channel.eq_ignore_ascii_case(c.as_bytes())) {
+            layers.entry(layer).or_default()[i].get_or_insert(name);
+        }
+    }
+    layers.into_iter().filter_map(|(layer, [r, g, b])| Some((lossy(layer), [r?.clone(), g?.clone(), b?.clone()])))
+}
+
+fn lossy(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// For a message of one line.
+fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    const MOST: usize = 24;
+    let mut names: Vec<_> = names.map(shorten).collect();
+    if names.len() > MOST {
+        let more = names.len() - MOST;
+        names.truncate(MOST);
+        names.push(format!("{more} more"));
+    }
+    names.join(", ")
+}
+
+/// The data window: x0, y0, x1, y1 (exclusive).
+fn window(header: &Header) -> [i64; 4] {
+    let [x, y] = [header.own_attributes.layer_position.0, header.own_attributes.layer_position.1].map(i64::from);
+    [x, y, x + header.layer_size.0 as i64, y + header.layer_size.1 as i64]
+}
+
+/// Which of the rows or columns of the data window are displayed.
+#[derive(Clone, Copy)]
+struct Visible {
+    /// How many come before them.
+    skipped: usize,
+    /// Where they are in the display window.
+    from: u32,
+    /// Exclusive.
+    to: u32,
+}
+
+impl Visible {
+    /// Of `n` from `at` on, in a display window from 0 to `end`.
+    fn new(at: i64, n: usize, end: usize) -> Option<Self> {
+        let (from, to) = (at.max(0), (at + n as i64).min(end as i64));
+        let place = |at: i64| u32::try_from(at).ok();
+        (from < to).then_some(Self { skipped: (from - at) as usize, from: place(from)?, to: place(to)? })
+    }
+
+    fn len(self) -> usize {
+        (self.to - self.from) as usize
+    }
+
+    /// Of the data window's `i`-th.
+    fn place(self, i: usize) -> Option<usize> {
+        i.checked_sub(self.skipped).filter(|&i| i < self.len())
+    }
+}
+
+struct Plane {
+    columns: Visible,
+    rows: Visible,
+    rgb: Vec<[f32; 3]>,
+}
+
+impl Plane {
+    fn new(columns: Visible, rows: Visible) -> Self {
+        Self { columns, rows, rgb: vec![[0.0; 3]; columns.len() * rows.len()] }
+    }
+
+    fn set(&mut self, at: Vec2<usize>, rgb: [f32; 3]) {
+        if let (Some(x), Some(y)) = (self.columns.place(at.0), self.rows.place(at.1)) {
+            self.rgb[y * self.columns.len() + x] = rgb;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ::exr::meta::attribute::IntegerBounds;
+    use ::exr::prelude::{
+        AnyChannel, AnyChannels, Compression, Encoding, FlatSamples, Image, ImageAttributes, Layer, LayerAttributes,
+        WritableImage, f16,
+    };
+
+    type Part = Layer<AnyChannels<FlatSamples>>;
+
+    fn bounds(x: i32, y: i32, width: usize, height: usize) -> IntegerBounds {
+        IntegerBounds::new((x, y), (width, height))
+    }
+
+    /// What channel number `c` has at a pixel of the plane.
+    fn value(c: usize, x: i32, y: i32) -> f32 {
+        (1000 * c) as f32 + 30.0 * y as f32 + x as f32
+    }
+
+    fn part(name: &str, data: IntegerBounds, channels: &[&str]) -> Part {
+        let (right, bottom) = (data.position.0 + data.size.0 as i32, data.position.1 + data.size.1 as i32);
+        let channel = |(c, name): (usize, &&str)| {
+            let row = |y| (data.position.0..right).map(move |x| value(c, x, y));
+            AnyChannel::new(*name, FlatSamples::F32((data.position.1..bottom).flat_map(row).collect()))
+        };
+        let channels = channels.iter().enumerate().map(channel).collect();
+        let attributes = LayerAttributes { layer_position: data.position, ..LayerAttributes::named(name) };
+        Layer::new(data.size, attributes, Encoding::FAST_LOSSLESS, AnyChannels::sort(channels))
+    }
+
+    fn saved(display: IntegerBounds, parts: impl IntoIterator<Item = Part>) -> tempfile::NamedTempFile {
+        let file = tempfile::Builder::new().suffix(".exr").tempfile().unwrap();
+        let image = Image::from_layers(ImageAttributes::new(display), parts.into_iter().collect::<Vec<_>>());
+        image.write().to_file(file.path()).unwrap();
+        file
+    }
+
+    /// Of a file whose parts have these channels: the first pixel, or what is wrong.
+    fn first(parts: &[&[&str]]) -> Result<[f32; 3], String> {
+        let window = bounds(0, 0, 2, 2);
+        let parts = parts.iter().enumerate().map(|(i, channels)| part(&format!("part {i}"), window, channels));
+        read(saved(window, parts).path()).map(|picture| picture.rgb[0]).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn channels_of_other_renderers() {
+        let chosen: [(&[&[&str]], [f32; 3]); 14] = [
+            (&[&["R", "G", "B"]], [0.0, 1000.0, 2000.0]),
+            (&[&["A", "B", "G", "R", "Z", "diffuse.R", "diffuse.G", "diffuse.B"]], [3000.0, 2000.0, 1000.0]),
+            (&[&["r", "g", "b", "a", "albedo.R", "albedo.G", "albedo.B"]], [0.0, 1000.0, 2000.0]),
+            // As Blender, Arnold and others name them.
+            (
+                &[&["ViewLayer.Combined.R", "ViewLayer.Combined.G", "ViewLayer.Combined.B", "ViewLayer.Combined.A"]],
+                [0.0, 1000.0, 2000.0],
+            ),
+            (&[&["beauty.r", "beauty.g", "beauty.b", "depth.Z"]], [0.0, 1000.0, 2000.0]),
+            (&[&["A.R", "A.G", "A.B", "L.Combined.R", "L.Combined.G", "L.Combined.B"]], [3000.0, 4000.0, 5000.0]),
+            (&[&["A.R", "A.G", "A.B", "Main_Beauty.R", "Main_Beauty.G", "Main_Beauty.B"]], [3000.0, 4000.0, 5000.0]),
+            (&[&["Y", "Combined.R", "Combined.G", "Combined.B"]], [1000.0, 2000.0, 3000.0]),
+            (&[&["Y"]], [0.0; 3]),
+            (&[&["A", "y"]], [1000.0; 3]),
+            // Parts: the first with the plain names, whatever is before it.
+            (&[&["Z"], &["X", "R", "G", "B"]], [1000.0, 2000.0, 3000.0]),
+            (&[&["r", "g", "b"], &["X", "R", "G", "B"]], [1000.0, 2000.0, 3000.0]),
+            (&[&["N.R", "N.G"], &["Z", "N.R", "N.G", "N.B"], &["N.B", "N.R", "N.G"]], [1000.0, 2000.0, 3000.0]),
+            (&[&["R", "G", "B"], &["X", "R", "G", "B"]], [0.0, 1000.0, 2000.0]),
+        ];
+        for (parts, pixel) in chosen {
+            assert_eq!(first(parts), Ok(pixel), "{parts:?}");
+        }
+        let refused: [(&[&[&str]], &[&str]); 7] = [
+            (&[&["Z", "N.X", "N.Y", "N.Z"]], &["no channels R, G and B", "N.X, N.Y, N.Z, Z"]),
+            (&[&["R", "G"], &["B"]], &["no channels R, G and B", "G, R, B"]),
+            (&[&["BY", "RY", "Y"]], &["no channels R, G and B", "BY, RY, Y"]),
+            (&[&["X", "Y", "Z"]], &["no channels R, G and B"]),
+            (&[&["b.R", "b.G", "b.B", "a.R", "a.G", "a.B"]], &["several layers", "a, b"]),
+            (&[&["Y", "albedo.R", "albedo.G", "albedo.B"]], &["several layers", "Y, albedo"]),
+            (
+                &[&["1.Combined.R", "1.Combined.G", "1.Combined.B"], &["2.Combined.R", "2.Combined.G", "2.Combined.B"]],
+                &["1.Combined, 2.Combined"],
+            ),
+        ];
+        for (parts, words) in refused {
+            let error = first(parts).unwrap_err();
+            assert!(error.starts_with("cannot read ") && error.contains(".exr: "), "{error}");
+            assert!(words.iter().all(|part| error.contains(part)), "{parts:?}: {error}");
+        }
+        let many: Vec<String> = (0..500).map(|i| format!("{i:0>200}")).collect();
+        let error = first(&[&many.iter().map(String::as_str).collect::<Vec<_>>()]).unwrap_err();
+        assert!(error.contains("476 more") && error.len() < 1500, "{error}");
+    }
+
+    #[test]
+    fn only_what_is_displayed_is_read() {
+        let display = bounds(0, 0, 20, 10);
+        let at = |picture: &Picture, x: i32, y: i32| {
+            let [x, y] = [x - picture.crop[0] as i32, y - picture.crop[1] as i32];
+            picture.rgb[(y * picture.crop_size()[0] as i32 + x) as usize]
+        };
+        let windows = [
+            (display, bounds(-8, -4, 36, 18), [0, 0, 20, 10]),
+            (display, bounds(-8, 0, 36, 10), [0, 0, 20, 10]),
+            (display, bounds(-8, -4, 20, 10), [0, 0, 12, 6]),
+            (display, bounds(5, 7, 40, 40), [5, 7, 20, 10]),
+            (display, bounds(3, 2, 5, 4), [3, 2, 8, 6]),
+            // In the display window's own coordinates.
+            (bounds(100, -50, 20, 10), bounds(100, -50, 20, 10), [0, 0, 20, 10]),
+            (bounds(100, -50, 20, 10), bounds(90, -48, 15, 4), [0, 2, 5, 6]),
+        ];
+        for (display, data, crop) in windows {
+            let file = saved(display, [part("main", data, &["R", "G", "B"])]);
+            let picture = read(file.path()).unwrap();
+            assert_eq!((picture.size, picture.crop), ([20, 10], crop), "{data:?}");
+            let [width, height] = picture.crop_size();
+            assert_eq!(picture.rgb.len(), width * height);
+            for (x, y) in [(crop[0], crop[1]), (crop[2] - 1, crop[1]), (crop[2] - 1, crop[3] - 1)] {
+                let (x, y) = (x as i32, y as i32);
+                let expected = [0, 1, 2].map(|c| value(c, x + display.position.0, y + display.position.1));
+                assert_eq!(at(&picture, x, y), expected, "{data:?} at ({x}, {y})");
+            }
+            let [x, y] = [data.position.0, data.position.1].map(i64::from);
+            let (right, bottom) = (x + data.size.0 as i64, y + data.size.1 as i64);
+            assert_eq!(data_window(file.path()).unwrap(), [x, y, right, bottom]);
+        }
+        let outside = saved(display, [part("main", bounds(-8, -9, 8, 30), &["R", "G", "B"])]);
+        let error = read(outside.path()).unwrap_err().to_string();
+        assert!(error.contains("data window, (-8, -9) to (0, 21), is outside of its display window, 20x10"), "{error}");
+    }
+
+    #[test]
+    fn half_floats_and_compressions() {
+        let window = bounds(-3, -3, 40, 40);
+        let lossless = [Compression::PIZ, Compression::ZIP16, Compression::PXR24, Compression::RLE].map(|c| (c, 0.0));
+        for (compression, error) in lossless.into_iter().chain([(Compression::DWAA(None), 0.02)]) {
+            let mut part = part("main", window, &["R", "G", "B", "A"]);
+            part.encoding = Encoding { compression, ..Encoding::UNCOMPRESSED };
+            for channel in &mut part.channel_data.list {
+                let half = |v: f32| f16::from_f32(v / 1024.0);
+                channel.sample_data = FlatSamples::F16(channel.sample_data.values_as_f32().map(half).collect());
+            }
+            let picture = read(saved(bounds(0, 0, 30, 30), [part]).path()).unwrap();
+            let expected = [0, 1, 2].map(|c| f16::from_f32(value(c, 7, 1) / 1024.0).to_f32());
+            let found = picture.rgb[30 + 7];
+            assert!((0..3).all(|c| (found[c] - expected[c]).abs() <= error), "{compression:?}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn other_files_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        assert!(read(&path).unwrap_err().to_string().starts_with("cannot read "));
+        std::fs::write(&path, "not an image").unwrap();
+        assert!(read(&path).is_err());
+    }
+
+    /// A header is a few bytes, and can ask for any amount.
+    #[test]
+    fn what_does_not_fit_into_memory_is_refused() {
+        let file = saved(bounds(0, 0, 2, 2), [part("main", bounds(0, 0, 2, 2), &["R", "G", "B"])]);
+        let bytes = std::fs::read(file.path()).unwrap();
+        let name = b"dataWindow\0box2i\0";
+        let at = bytes.windows(name.len()).position(|part| part == name).unwrap() + name.len() + 4;
+        // Left, top, right, bottom, the last two inclusive.
+        for (right, bottom) in [(1 << 20, 1 << 20), ((1 << 28) - 1, 0), (0, (1 << 28) - 1)] {
+            let mut large = bytes.clone();
+            large[at + 8..at + 12].copy_from_slice(&i32::to_le_bytes(right));
+            large[at + 12..at + 16].copy_from_slice(&i32::to_le_bytes(bottom));
+            std::fs::write(file.path(), large).unwrap();
+            let error = read(file.path()).unwrap_err().to_string();
+            assert!(error.contains("pixels, more than") || error.contains("blocks"), "{right} {bottom}: {error}");
+        }
+    }
+}
