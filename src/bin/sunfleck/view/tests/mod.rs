@@ -1,6 +1,7 @@
 //! The window, driven without a display; the engine behind it is the real one, on the processor.
 
 mod camera;
+mod fields;
 mod files;
 mod panels;
 mod shortcuts;
