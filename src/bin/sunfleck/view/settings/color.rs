@@ -27,14 +27,19 @@ pub fn color(ui: &mut Ui, name: &str, color: &mut [f32; 3], most: f32) -> Respon
         Stroke::new(1.0, visuals.fg_stroke.color.gamma_multiply(0.4)),
         egui::StrokeKind::Inside,
     );
+    // That of menus has no frames around fields.
+    let style = ui.style().clone();
     let popup = Popup::menu(&response).close_behavior(PopupCloseBehavior::CloseOnClickOutside);
     popup.width(WIDTH).show(|ui| {
+        ui.set_style(style);
         ui.set_width(WIDTH);
         hues(ui, color).on_hover_text("Hue, and upwards how strong it is. The largest of the three numbers stays.");
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
-            let each = vec2(((WIDTH - 8.0) / 3.0).floor(), ui.spacing().interact_size.y);
-            for (value, name) in color.iter_mut().zip(["R", "G", "B"]) {
+            for (i, (value, name)) in color.iter_mut().zip(["R", "G", "B"]).enumerate() {
+                ui.label(name);
+                let each = ((ui.available_width() - 16.0 * (2 - i) as f32) / (3 - i) as f32).floor();
+                let each = vec2(each, ui.spacing().interact_size.y);
                 let speed = f64::from(value.clamp(0.1, 1e3)) * 0.01;
                 let number = drag_sized(ui, each, value, Number::Plain, speed, 0.0..=most);
                 named(number, name).on_hover_text(format!("{name}, linear"));

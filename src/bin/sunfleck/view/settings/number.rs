@@ -19,7 +19,7 @@ pub enum Number {
     Degrees,
     Stops,
     Metres,
-    /// Metres, with so many places after the point.
+    /// Metres, with up to so many places after the point.
     Coordinate(usize),
 }
 
@@ -37,7 +37,12 @@ impl Number {
             Self::Degrees => digits(x, 2) + "°",
             Self::Stops => digits(x, 2) + " EV",
             Self::Metres => length_text(x) + " m",
-            Self::Coordinate(places) => unsigned_zero(format!("{x:.places$}")),
+            Self::Coordinate(places) => {
+                // Fewer of a long one: a third of a row has no more room.
+                let whole = x.abs().max(1.0).log10() as usize + 1;
+                let places = if whole > 1 { places.min(5_usize.saturating_sub(whole)) } else { places };
+                unsigned_zero(format!("{x:.places$}"))
+            }
         }
     }
 
@@ -267,7 +272,9 @@ mod tests {
         ] {
             assert_eq!(digits(x, 3), text);
         }
-        assert_eq!(Number::Coordinate(2).text(-0.001), "0.00");
+        for (x, text) in [(-0.001, "0.00"), (4.75, "4.75"), (-123.456, "-123.46"), (-123_456.78, "-123457")] {
+            assert_eq!(Number::Coordinate(2).text(x), text);
+        }
     }
 
     #[test]

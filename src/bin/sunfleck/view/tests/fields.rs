@@ -191,9 +191,9 @@ fn colours_are_linear_and_of_any_size() {
         let at = field(&window, "B");
         end(&mut window, "12.3456", Some(Key::Enter));
         assert_eq!(sky(&mut window), [r, g, 12.3456]);
-        // Pure red, as bright.
+        // To the left end, red, as bright.
         let left = field(&window, "R").min.x;
-        drag(&mut window, egui::pos2(left, at.min.y - 8.0), -6.0);
+        drag(&mut window, egui::pos2(left, at.min.y - 8.0), -30.0);
         let [r, g, b] = sky(&mut window);
         assert!(r == 12.3456 && g == b, "{r} {g} {b}");
         drag(&mut window, egui::pos2(left + 70.0, at.min.y - 100.0), 2.0);
