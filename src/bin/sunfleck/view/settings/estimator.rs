@@ -182,7 +182,7 @@ fn numbers(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, now: &Settings) {
     let mut longest = now.max_segments.unwrap_or(0);
     let mut changed = false;
     let reset = row(ui, LONGEST, now.max_segments != read.max_segments, |ui| {
-        let drag = egui::DragValue::new(&mut longest).speed(1.0).range(0..=1000);
+        let drag = egui::DragValue::new(&mut longest).speed(1.0).range(0..=u32::MAX);
         let drag = drag.custom_formatter(|n, _| if n < 0.5 { NO_LIMIT.to_owned() } else { format!("{n:.0}") });
         let response = whole(ui, egui::vec2(ui.available_width(), ui.spacing().interact_size.y), drag);
         changed = response.changed();

@@ -88,7 +88,8 @@ pub const NO_LIMIT: &str = "no limit";
 pub fn whole(ui: &mut Ui, size: egui::Vec2, drag: DragValue<'_>) -> Response {
     let read = |text: &str| if text.trim() == NO_LIMIT { Some(0.0) } else { text.trim().parse().ok() };
     let read = unless_escaped(ui, read);
-    ui.add_sized(size, drag.update_while_editing(false).clip_text(true).custom_parser(read))
+    let drag = drag.update_while_editing(false).clip_text(true).clamp_existing_to_range(false);
+    ui.add_sized(size, drag.custom_parser(read))
 }
 
 /// A number in all of the room; dragging changes it by `speed` a point.

@@ -4,7 +4,7 @@ use eframe::egui;
 use egui::{Event, Key, Modifiers, PointerButton, Pos2, Rect, Role};
 use egui_kittest::Node;
 use egui_kittest::kittest::{NodeT, Queryable};
-use sunfleck::scene::settings::{CameraSettings, Count, EnvironmentSettings, Settings};
+use sunfleck::scene::settings::{CameraSettings, Count, EnvironmentSettings, FirstRadius, Settings};
 
 use super::Window;
 use super::panels::bare;
@@ -84,6 +84,8 @@ fn awkward(settings: &mut Settings) {
     settings.photons = Some(Count(54_321));
     settings.light_scale = Some(0.000_412_3);
     settings.seed = Some(4_000_000_007);
+    settings.max_segments = Some(5000);
+    settings.radius = Some(FirstRadius::Fixed(2e-9));
     let sky = settings.environment.insert(EnvironmentSettings::default());
     (sky.color, sky.strength, sky.rotation_degrees) = (Some([2.0, 1.5, 0.5]), Some(123.456_7), Some(-37.123_45));
 }
@@ -96,6 +98,7 @@ fn visiting_a_field_changes_nothing() {
     window.viewer().edit_at(10.0, "test", |s| s.camera = Some(focus));
     window.viewer().wanted.painting.look.exposure = Some(1.0 / 3.0);
     window.steps(2);
+    assert_eq!(window.viewer().edits.now().max_segments, Some(5000), "only shown");
     let seen = |window: &mut Window| (window.viewer().edits.now().clone(), window.viewer().wanted.painting);
     let before = seen(&mut window);
     let n = all_fields(&window).len();
@@ -196,7 +199,7 @@ fn colours_are_linear_and_of_any_size() {
         drag(&mut window, egui::pos2(left, at.min.y - 8.0), -30.0);
         let [r, g, b] = sky(&mut window);
         assert!(r == 12.3456 && g == b, "{r} {g} {b}");
-        drag(&mut window, egui::pos2(left + 70.0, at.min.y - 100.0), 2.0);
+        drag(&mut window, egui::pos2(left + 58.0, at.min.y - 100.0), 2.0);
         let [r, g, b] = sky(&mut window);
         assert!(g == 12.3456 && r < 3.0 && b < 3.0, "{r} {g} {b}");
         field(&window, "Largest");
