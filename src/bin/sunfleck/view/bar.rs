@@ -137,11 +137,12 @@ fn limits(ui: &mut egui::Ui, limits: &mut Limits) {
     let is_on = [limits.iterations.is_some(), limits.seconds.is_some(), limits.noise.is_some()];
     let n = DragValue::new(&mut numbers.iterations).range(1..=u32::MAX).speed(1.0).suffix(" iterations");
     let iterations = limit(ui, is_on[0], "iterations", "Stop after so many iterations since the restart", n);
-    let s = DragValue::new(&mut numbers.seconds).range(0.1..=1e7).speed(0.5).max_decimals(1).suffix(" s");
+    let s = DragValue::new(&mut numbers.seconds).range(0.1..=1e7).speed(0.5).suffix(" s");
     let seconds = limit(ui, is_on[1], "seconds", "Stop after so many seconds since the restart, pauses left out", s);
     let speed = 0.01 * numbers.noise;
     let e = DragValue::new(&mut numbers.noise).range(1e-9..=1.0).speed(speed).prefix("noise ");
-    let e = e.custom_formatter(|noise, _| format!("{noise:.1e}"));
+    // All digits: what is shown is what is read when the field is left.
+    let e = e.custom_formatter(|noise, _| format!("{noise:e}"));
     let noise = limit(
         ui,
         is_on[2],

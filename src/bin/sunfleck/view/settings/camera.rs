@@ -1,17 +1,19 @@
 //! The camera: which one, where it stands, its lens.
 
 use eframe::egui;
-use egui::{DragValue, Ui};
+use egui::Ui;
 use sunfleck::scene::settings::{CameraSettings, Settings};
 use sunfleck::scene::{Camera, Projection, Scene};
 
-use super::widgets::{Name, metres, named, row, slider};
+use super::number::{Number, drag_sized, metres, slider};
+use super::widgets::{Name, named, row};
 use crate::progress::decimals;
 use crate::view::app::Viewer;
 use crate::view::engine::Message;
 
 const CAMERA: Name = Name { name: "Camera", hint: "One of the scene's cameras. Restarts the estimate." };
-const POSITION: Name = Name { name: "Position", hint: "x, y and z, metres. Restarts the estimate." };
+const POSITION: Name =
+    Name { name: "Position", hint: "x, y and z, metres; 5 mm or 2 km can be typed, too. Restarts the estimate." };
 const VIEW: Name =
     Name { name: "Field of view", hint: "Full vertical angle of the view, degrees. Restarts the estimate." };
 const HEIGHT: Name = Name { name: "Half height", hint: "Half the height of the view, metres. Restarts the estimate." };
@@ -171,17 +173,16 @@ fn place(ui: &mut Ui, viewer: &mut Viewer, camera: &Camera, file: Option<&File>)
     let mut position = settings.position.unwrap_or_default();
     let mut changed = false;
     let was = file.and_then(|file| file.camera.position).filter(|was| *was != position);
+    let size = f64::from(viewer.scene_size());
     let reset = row(ui, POSITION, was.is_some(), |ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         // So that a sign does not widen the panel.
         ui.spacing_mut().button_padding.x = 1.0;
         let each = egui::vec2(((ui.available_width() - 4.0) / 3.0).max(20.0), ui.spacing().interact_size.y);
-        let scale = camera.focus_distance.abs().clamp(1e-6, 1e6);
-        let (speed, decimals) = (f64::from(scale) * 0.005, decimals(scale.into()));
-        let mut drag = |value: &mut f32, name: &str| {
-            let drag = DragValue::new(value).speed(speed).range(-1e9..=1e9).update_while_editing(false);
-            named(ui.add_sized(each, drag.max_decimals(decimals)), name)
-        };
+        // Not by the distance in focus, which a scene's file need not say.
+        let number = Number::Coordinate(decimals(size));
+        let mut drag =
+            |value: &mut f32, name: &str| named(drag_sized(ui, each, value, number, 0.002 * size, -1e9..=1e9), name);
         let [x, y, z] = &mut position;
         let response = drag(x, "x") | drag(y, "y") | drag(z, "z");
         changed = response.changed();
@@ -197,7 +198,7 @@ fn place(ui: &mut Ui, viewer: &mut Viewer, camera: &Camera, file: Option<&File>)
 }
 
 fn lens(ui: &mut Ui, viewer: &mut Viewer, camera: &Camera, file: Option<&File>) {
-    let time = ui.input(|i| i.time);
+    let (time, size) = (ui.input(|i| i.time), viewer.scene_size());
     let now = CameraSettings::from(camera);
     let differs = |field| file.is_some_and(|file| file.differs(&now, field));
     let mut back;
@@ -206,7 +207,7 @@ fn lens(ui: &mut Ui, viewer: &mut Viewer, camera: &Camera, file: Option<&File>) 
             let mut degrees = f64::from(yfov.to_degrees());
             let field: Field = |settings| &mut settings.yfov_degrees;
             let reset = row(ui, VIEW, differs(field), |ui| {
-                let response = slider(ui, &mut degrees, 5.0..=140.0, |slider| slider.max_decimals(1).suffix("°"));
+                let response = slider(ui, &mut degrees, Number::Degrees, 5.0..=140.0);
                 if response.changed() {
                     viewer.move_rig(time, &mut |rig| rig.set_yfov((degrees as f32).to_radians()));
                 }
@@ -217,7 +218,7 @@ fn lens(ui: &mut Ui, viewer: &mut Viewer, camera: &Camera, file: Option<&File>) 
         Projection::Orthographic { mut ymag } => {
             let field: Field = |settings| &mut settings.ymag;
             let reset = row(ui, HEIGHT, differs(field), |ui| {
-                let response = metres(ui, &mut ymag, 1e-6);
+                let response = metres(ui, &mut ymag, 1e-6 * size, size);
                 if response.changed() {
                     let settings = CameraSettings { ymag: Some(ymag), ..CameraSettings::from(camera) };
                     viewer.edit(ui, "camera", |s| s.camera = Some(settings));
@@ -230,7 +231,7 @@ fn lens(ui: &mut Ui, viewer: &mut Viewer, camera: &Camera, file: Option<&File>) 
     let (mut aperture, mut focus) = (camera.aperture_radius, camera.focus_distance);
     let field: Field = |settings| &mut settings.aperture_radius;
     let reset = row(ui, APERTURE, differs(field), |ui| {
-        let response = metres(ui, &mut aperture, 0.0);
+        let response = metres(ui, &mut aperture, 0.0, size);
         if response.changed() {
             viewer.move_rig(time, &mut |rig| rig.set_aperture_radius(aperture));
         }
@@ -239,7 +240,7 @@ fn lens(ui: &mut Ui, viewer: &mut Viewer, camera: &Camera, file: Option<&File>) 
     back = back.or(reset.then_some(field));
     let field: Field = |settings| &mut settings.focus_distance;
     let reset = row(ui, FOCUS, differs(field), |ui| {
-        let response = metres(ui, &mut focus, 1e-6);
+        let response = metres(ui, &mut focus, 1e-6 * size, size);
         if response.changed() {
             viewer.move_rig(time, &mut |rig| rig.set_focus_distance(focus));
         }

@@ -6,7 +6,8 @@ use sunfleck::ppm::Params;
 use sunfleck::scene::Accelerator;
 use sunfleck::scene::settings::{Count, Direct, FirstRadius, Index, Kernel, Settings};
 
-use super::widgets::{Name, choice, count_of, count_text, metres, rounded, row, slider};
+use super::number::{NO_LIMIT, Number, log_slider, metres, rounded, slider, whole};
+use super::widgets::{Name, choice, row};
 use crate::view::app::Viewer;
 
 const PHOTONS: Name = Name {
@@ -24,7 +25,8 @@ const RADIUS: Name = Name {
     hint: "Distance within which the first iteration gathers photons: found for every pixel, or the same everywhere, \
            metres. Restarts the estimate.",
 };
-const FIXED_RADIUS: Name = Name { name: "", hint: "First radius, metres. Restarts the estimate." };
+const FIXED_RADIUS: Name =
+    Name { name: "", hint: "First radius, metres; 5 mm can be typed, too. Restarts the estimate." };
 const KERNEL: Name =
     Name { name: "Kernel", hint: "How a photon's weight falls with its distance. Restarts the estimate." };
 const DIRECT: Name =
@@ -72,9 +74,7 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     let mut photons = f64::from(now.photons.map_or(defaults.n_paths, |n| n.0));
     let mut changed = None;
     let reset = row(ui, PHOTONS, now.photons != read.photons, |ui| {
-        let response = slider(ui, &mut photons, 1e3..=2e7, |slider| {
-            slider.logarithmic(true).custom_formatter(|n, _| count_text(n)).custom_parser(count_of)
-        });
+        let response = log_slider(ui, &mut photons, Number::Count, 1e3..=2e7);
         if response.changed() {
             let n = if response.dragged() { rounded(photons) } else { photons };
             changed = Some(n.clamp(1.0, f64::from(u32::MAX)) as u32);
@@ -91,7 +91,7 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     let mut alpha = f64::from(now.alpha.unwrap_or(defaults.alpha));
     let mut changed = false;
     let reset = row(ui, ALPHA, now.alpha != read.alpha, |ui| {
-        let response = slider(ui, &mut alpha, 0.01..=0.99, |slider| slider.max_decimals(3));
+        let response = slider(ui, &mut alpha, Number::Plain, 0.01..=0.99);
         changed = response.changed();
         response
     });
@@ -160,9 +160,10 @@ fn radius(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, now: &Settings) {
         let automatic = viewer.now.frame.as_ref().map(|frame| frame.first_radius).filter(|r| *r > 0.0);
         fixed = is_fixed.then(|| short(automatic.unwrap_or(0.01)));
     }
+    let size = viewer.scene_size();
     if let Some(radius) = &mut fixed {
         row(ui, FIXED_RADIUS, false, |ui| {
-            let response = metres(ui, radius, 1e-6);
+            let response = metres(ui, radius, 1e-6 * size, size);
             changed |= response.changed();
             response
         });
@@ -181,9 +182,9 @@ fn numbers(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, now: &Settings) {
     let mut longest = now.max_segments.unwrap_or(0);
     let mut changed = false;
     let reset = row(ui, LONGEST, now.max_segments != read.max_segments, |ui| {
-        let drag = egui::DragValue::new(&mut longest).speed(1.0).range(0..=1000).update_while_editing(false);
-        let drag = drag.custom_formatter(|n, _| if n < 0.5 { "no limit".to_owned() } else { format!("{n:.0}") });
-        let response = ui.add_sized(egui::vec2(ui.available_width(), ui.spacing().interact_size.y), drag);
+        let drag = egui::DragValue::new(&mut longest).speed(1.0).range(0..=u32::MAX);
+        let drag = drag.custom_formatter(|n, _| if n < 0.5 { NO_LIMIT.to_owned() } else { format!("{n:.0}") });
+        let response = whole(ui, egui::vec2(ui.available_width(), ui.spacing().interact_size.y), drag);
         changed = response.changed();
         response
     });
@@ -197,8 +198,8 @@ fn numbers(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, now: &Settings) {
     let mut seed = now.seed.unwrap_or(0);
     let mut changed = false;
     let reset = row(ui, SEED, now.seed != read.seed, |ui| {
-        let drag = egui::DragValue::new(&mut seed).speed(1.0).update_while_editing(false);
-        let response = ui.add_sized(egui::vec2(ui.available_width(), ui.spacing().interact_size.y), drag);
+        let drag = egui::DragValue::new(&mut seed).speed(1.0);
+        let response = whole(ui, egui::vec2(ui.available_width(), ui.spacing().interact_size.y), drag);
         changed = response.changed();
         response
     });

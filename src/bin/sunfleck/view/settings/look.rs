@@ -5,7 +5,8 @@ use egui::{DragValue, Ui};
 use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::settings::{MAX_SIDE, Settings, Size};
 
-use super::widgets::{Name, choice, named, row, slider};
+use super::number::{Number, slider, whole};
+use super::widgets::{Name, choice, named, row};
 use crate::view::app::Viewer;
 
 const SIZE: Name = Name { name: "Size", hint: "Width and height of the picture, pixels. Restarts the estimate." };
@@ -65,10 +66,10 @@ fn size(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     let reset = row(ui, SIZE, now.size != read.size, |ui| {
         let each = egui::vec2(((ui.available_width() - 18.0) / 2.0).max(20.0), ui.spacing().interact_size.y);
         let [width, height] = &mut size;
-        let drag = |side| DragValue::new(side).range(1..=MAX_SIDE).speed(2.0).update_while_editing(false);
-        let mut response = named(ui.add_sized(each, drag(width)), "Width");
+        let drag = |side| DragValue::new(side).range(1..=MAX_SIDE).speed(2.0);
+        let mut response = named(whole(ui, each, drag(width)), "Width");
         response |= ui.label("×");
-        response |= named(ui.add_sized(each, drag(height)), "Height");
+        response |= named(whole(ui, each, drag(height)), "Height");
         if response.changed() {
             chosen = Some(size);
         }
@@ -111,13 +112,21 @@ fn exposure(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     if changed {
         exposure = is_given.then_some((shown * 10.0).round() / 10.0);
     }
-    // Rounded as it is shown, so that nothing is −0.0; a picture's own brightness has more digits.
-    let mut stops = (f64::from(exposure.unwrap_or(shown)) * 10.0).round() / 10.0 + 0.0;
+    // A picture's own brightness has more digits than anyone wants to see, and changes with the picture: not while another
+    // is typed, which would be lost by it.
+    let held = ui.scope_id().with("exposure");
+    let shown = ui.data(|data| data.get_temp(held)).unwrap_or((shown * 10.0).round() / 10.0);
+    let mut stops = f64::from(exposure.unwrap_or(shown));
     row(ui, STOPS, false, |ui| {
-        let response = slider(ui, &mut stops, -10.0..=10.0, |slider| slider.fixed_decimals(1).suffix(" EV"));
+        let response = slider(ui, &mut stops, Number::Stops, -10.0..=10.0);
         if response.changed() {
             exposure = Some((stops as f32).clamp(-64.0, 64.0));
             changed = true;
+        }
+        if response.has_focus() {
+            ui.data_mut(|data| data.insert_temp(held, shown));
+        } else {
+            ui.data_mut(|data| data.remove::<f32>(held));
         }
         response
     });

@@ -6,13 +6,15 @@ use glam::Vec3;
 use sunfleck::scene::settings::{MaterialSettings, Settings};
 use sunfleck::scene::{Material, Scene};
 
-use super::scene::{logarithmic, tidy};
-use super::widgets::{Name, row, slider};
+use super::color::color;
+use super::number::{Number, log_slider, slider};
+use super::scene::tidy;
+use super::widgets::{Name, row};
 use crate::view::app::Viewer;
 
 const MATERIAL: Name = Name { name: "Material", hint: "Click on an object in the picture, or choose here." };
 const BASE_COLOR: Name =
-    Name { name: "Base colour", hint: "Linear RGB; a texture multiplies it. Restarts the estimate." };
+    Name { name: "Base colour", hint: "Linear RGB from 0 to 1; a texture multiplies it. Restarts the estimate." };
 const ROUGHNESS: Name =
     Name { name: "Roughness", hint: "From 0, a mirror, to 1; a texture multiplies it. Restarts the estimate." };
 const METALLIC: Name = Name {
@@ -22,6 +24,10 @@ const METALLIC: Name = Name {
 const TRANSMISSION: Name = Name {
     name: "Transmission",
     hint: "Share of the light that enters and is let through, as in glass, from 0 to 1. Restarts the estimate.",
+};
+const SPECULAR: Name = Name {
+    name: "Specular",
+    hint: "Weight of the reflection of paint, plastic or glass, from 0, none, to 1. Restarts the estimate.",
 };
 const IOR: Name = Name {
     name: "Refraction",
@@ -64,28 +70,44 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     }
 }
 
-/// A number of a material: where settings have it, what its file says, its range.
-struct Number {
+/// A number of a material: where settings have it, what its file says, its range, why it would change nothing.
+struct Property {
     name: Name,
     field: fn(&mut MaterialSettings) -> &mut Option<f32>,
     own: f32,
     range: [f64; 2],
-    is_logarithmic: bool,
+    idle: Option<&'static str>,
+}
+
+/// Why roughness, transmission, specular and index of refraction would change nothing of a material as it stands now.
+fn idle(own: &Material, now: &MaterialSettings) -> [Option<&'static str>; 4] {
+    let metallic = now.metallic.unwrap_or(own.metallic);
+    let transmission = now.transmission.unwrap_or(own.transmission);
+    let specular = now.specular.unwrap_or(own.specular);
+    // What a texture multiplies is less than 1 somewhere.
+    let metal = (metallic == 1.0 && own.metallic_roughness_texture.is_none()).then_some("A metal: metallic is 1");
+    let clear = (transmission == 1.0 && own.transmission_texture.is_none())
+        .then_some("Whatever enters is let through: transmission is 1");
+    let dull = (specular == 0.0 && transmission == 0.0).then_some(match metallic {
+        0.0 => "A diffuse surface: specular, metallic and transmission are 0",
+        _ => "Nothing but metal is reflected from: specular and transmission are 0",
+    });
+    [dull.filter(|_| metallic == 0.0), metal, metal.or(clear), metal.or(dull)]
 }
 
 fn properties(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, index: usize, own: &Material) {
     let was = read.clone().material_mut(scene, index).clone();
     let before = viewer.settings().as_ref().clone().material_mut(scene, index).clone();
-    let mut color = before.base_color.unwrap_or(own.base_color.to_array());
+    let mut base = before.base_color.unwrap_or(own.base_color.to_array());
     let mut changed = false;
     let reset = row(ui, BASE_COLOR, before.base_color != was.base_color, |ui| {
-        let response = ui.color_edit_button_rgb(&mut color);
+        let response = color(ui, BASE_COLOR.name, &mut base, 1.0);
         changed = response.changed();
         response
     });
     if changed {
-        let color = color.map(|c| c.clamp(0.0, 1.0));
-        viewer.edit(ui, "base colour", |s| s.material_mut(scene, index).base_color = Some(color));
+        let base = base.map(|c| c.clamp(0.0, 1.0));
+        viewer.edit(ui, "base colour", |s| s.material_mut(scene, index).base_color = Some(base));
     }
     if reset {
         viewer.reset(ui, |s| {
@@ -93,29 +115,31 @@ fn properties(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, 
             tidy(s, read);
         });
     }
-    let unit = |name, field, own| Number { name, field, own, range: [0.0, 1.0], is_logarithmic: false };
-    let numbers = [
-        unit(ROUGHNESS, |m| &mut m.roughness, own.roughness),
+    let unit = |name, field, own| Property { name, field, own, range: [0.0, 1.0], idle: None };
+    let [rough, through, shiny, bent] = idle(own, &before);
+    let properties = [
+        Property { idle: rough, ..unit(ROUGHNESS, |m| &mut m.roughness, own.roughness) },
         unit(METALLIC, |m| &mut m.metallic, own.metallic),
-        unit(TRANSMISSION, |m| &mut m.transmission, own.transmission),
-        Number { range: [1.0, 2.5], ..unit(IOR, |m| &mut m.ior, own.ior) },
-        Number { range: [0.0, 1000.0], is_logarithmic: true, ..unit(EMISSION, |m| &mut m.emission_strength, 1.0) },
+        Property { idle: through, ..unit(TRANSMISSION, |m| &mut m.transmission, own.transmission) },
+        Property { idle: shiny, ..unit(SPECULAR, |m| &mut m.specular, own.specular) },
+        Property { range: [1.0, 2.5], idle: bent, ..unit(IOR, |m| &mut m.ior, own.ior) },
+        Property { range: [0.0, 1000.0], ..unit(EMISSION, |m| &mut m.emission_strength, 1.0) },
     ];
     let shines = before.emission.map_or(own.emission, Vec3::from) != Vec3::ZERO;
-    for Number { name, field, own, range: [low, high], is_logarithmic } in numbers {
-        if name.name == EMISSION.name && !shines {
+    for Property { name, field, own, range: [low, high], idle } in properties {
+        let is_emission = name.name == EMISSION.name;
+        if is_emission && !shines {
             continue;
         }
         let (value, old) = (*field(&mut before.clone()), *field(&mut was.clone()));
         let mut shown = f64::from(value.unwrap_or(own));
         let mut changed = false;
         let reset = row(ui, name, value != old, |ui| {
-            let response = slider(ui, &mut shown, low..=high, |slider| match is_logarithmic {
-                true => logarithmic(slider),
-                false => slider.max_decimals(3),
-            });
+            let slide = if is_emission { log_slider } else { slider };
+            let control = |ui: &mut Ui| slide(ui, &mut shown, Number::Plain, low..=high);
+            let response = ui.add_enabled_ui(idle.is_none(), control).inner;
             changed = response.changed();
-            response
+            response.on_disabled_hover_text(idle.unwrap_or_default())
         });
         if changed {
             let value = match name.name {
@@ -131,5 +155,31 @@ fn properties(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, 
                 tidy(s, read);
             });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_changes_nothing_is_told() {
+        let asks = |own: &Material, change: &str| {
+            let mut now = MaterialSettings::default();
+            match change {
+                "specular" => now.specular = Some(0.5),
+                "metallic" => now.metallic = Some(0.5),
+                _ => {}
+            }
+            idle(own, &now).map(|why| why.is_none())
+        };
+        let wall = Material::diffuse("wall", Vec3::ONE);
+        assert_eq!(asks(&wall, ""), [false, true, true, false]);
+        assert_eq!(asks(&wall, "specular"), [true; 4]);
+        assert_eq!(asks(&wall, "metallic"), [true, true, true, false]);
+        let metal = Material::metal("metal", Vec3::ONE, 0.1);
+        assert_eq!(asks(&metal, ""), [true, false, false, false]);
+        assert_eq!(asks(&metal, "metallic"), [true; 4]);
+        assert_eq!(asks(&Material::glass("glass", 1.5), ""), [true, true, false, true]);
     }
 }

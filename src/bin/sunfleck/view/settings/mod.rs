@@ -1,9 +1,11 @@
 //! The panel on the left: everything that settings can say, each with its way back to what the file says.
 
 mod camera;
+mod color;
 mod estimator;
 mod look;
 mod material;
+mod number;
 mod scene;
 mod widgets;
 
@@ -65,5 +67,11 @@ impl Viewer {
     /// The settings, for a panel to look at while it changes them.
     fn settings(&self) -> Arc<Settings> {
         Arc::clone(self.edits.now())
+    }
+
+    /// Diagonal of the scene's bounds, metres; 1 of one that has none. What lengths are dragged in proportion to.
+    fn scene_size(&self) -> f32 {
+        let size = self.opened().map_or(1.0, |opened| opened.bounds[0].distance(opened.bounds[1]));
+        if size.is_finite() && size > 0.0 { size } else { 1.0 }
     }
 }

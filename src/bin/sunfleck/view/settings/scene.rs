@@ -7,7 +7,9 @@ use sunfleck::scene::defaults::has_light;
 use sunfleck::scene::settings::{EnvironmentSettings, MaterialSettings, SceneLightSettings, Settings};
 use sunfleck::scene::{PunctualKind, PunctualLight, Scene};
 
-use super::widgets::{Name, back, row, slider};
+use super::color::color;
+use super::number::{Number, drag_sized, log_slider, slider};
+use super::widgets::{Name, back, row};
 use crate::view::app::Viewer;
 
 const SOURCE: Name = Name { name: "Source", hint: "Where the light from infinitely far away comes from." };
@@ -16,7 +18,10 @@ const ROTATION: Name = Name {
     hint: "Turns the environment about the y axis, counter-clockwise seen from above, degrees. Restarts the estimate.",
 };
 const STRENGTH: Name = Name { name: "Strength", hint: "Factor on the environment's light. Restarts the estimate." };
-const COLOR: Name = Name { name: "Colour", hint: "Radiance all around, linear RGB. Restarts the estimate." };
+const COLOR: Name = Name {
+    name: "Colour",
+    hint: "Radiance all around, linear RGB of any size ≥ 0; the button shows its hue. Restarts the estimate.",
+};
 const SCALE: Name = Name {
     name: "Light scale",
     hint: "Factor on every light: lamps, glowing surfaces, environment. Restarts the estimate.",
@@ -72,15 +77,15 @@ pub fn environment(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
         }
         return;
     }
-    if let Sky::Color(mut color) = sky {
+    if let Sky::Color(mut radiance) = sky {
         let mut changed = false;
         let reset = row(ui, COLOR, was.color.is_some() && given.color != was.color, |ui| {
-            let response = ui.color_edit_button_rgb(&mut color);
+            let response = color(ui, COLOR.name, &mut radiance, f32::MAX);
             changed = response.changed();
             response
         });
         if changed || reset {
-            let color = if reset { was.color } else { Some(color) };
+            let color = if reset { was.color } else { Some(radiance) };
             edit_sky(ui, viewer, "environment colour", read, |sky| sky.color = color);
         }
     }
@@ -97,10 +102,10 @@ pub fn environment(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
         let mut changed = false;
         let reset = row(ui, name, value != old, |ui| {
             let range = if i == 0 { -180.0..=180.0 } else { 0.0..=100.0 };
-            let response = slider(ui, &mut shown, range, |slider| match i {
-                0 => slider.max_decimals(1).suffix("°"),
-                _ => logarithmic(slider),
-            });
+            let response = match i {
+                0 => slider(ui, &mut shown, Number::Degrees, range),
+                _ => log_slider(ui, &mut shown, Number::Plain, range),
+            };
             changed = response.changed();
             response
         });
@@ -130,11 +135,6 @@ fn edit_sky(
     });
 }
 
-/// For factors.
-pub fn logarithmic(slider: egui::Slider<'_>) -> egui::Slider<'_> {
-    slider.logarithmic(true).smallest_positive(0.01).max_decimals(3)
-}
-
 pub fn lights(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     let Some(opened) = viewer.opened().cloned() else { return };
     let scene = &opened.loaded.scene;
@@ -142,7 +142,7 @@ pub fn lights(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     let mut scale = f64::from(now.light_scale.unwrap_or(1.0));
     let mut changed = false;
     let reset = row(ui, SCALE, now.light_scale != read.light_scale, |ui| {
-        let response = slider(ui, &mut scale, 0.0..=100.0, logarithmic);
+        let response = log_slider(ui, &mut scale, Number::Plain, 0.0..=100.0);
         changed = response.changed();
         response
     });
@@ -191,17 +191,20 @@ fn light(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, i: us
                     }
                 },
             );
-            let mut color = now.color.unwrap_or_else(|| hue(light.intensity));
-            let hint = "Its colour, linear RGB; it stays as bright. Restarts the estimate.";
-            if ui.color_edit_button_rgb(&mut color).on_hover_text(hint).changed() && color != [0.0; 3] {
-                now.color = Some(color);
+            let mut rgb = now.color.unwrap_or_else(|| hue(light.intensity));
+            let hint =
+                "Its colour, linear RGB, of which only the ratio matters: it stays as bright. Restarts the estimate.";
+            let response = color(ui, &format!("Colour of {name}"), &mut rgb, f32::MAX).on_hover_text(hint);
+            if response.changed() && rgb != [0.0; 3] {
+                now.color = Some(rgb);
             }
             let mut strength = now.strength.unwrap_or(1.0);
-            let speed = 0.01 * strength.max(0.1);
-            let drag = egui::DragValue::new(&mut strength).speed(speed).range(0.0..=1e6).max_decimals(3).prefix("× ");
+            let speed = f64::from(0.01 * strength.max(0.1));
+            let size = egui::vec2(62.0, height);
+            let response = drag_sized(ui, size, &mut strength, Number::Factor, speed, 0.0..=1e6);
             let hint =
                 format!("Factor on its {:.4} {}. Restarts the estimate.", light.intensity.max_element(), unit(light));
-            if ui.add_sized(egui::vec2(62.0, height), drag.update_while_editing(false)).on_hover_text(hint).changed() {
+            if response.on_hover_text(hint).changed() {
                 now.strength = Some(strength);
             }
             if before != was {

@@ -1,10 +1,7 @@
 //! Rows of the panel: a name, a control, and a way back.
 
-use std::ops::RangeInclusive;
-
 use eframe::egui;
-use egui::{DragValue, Response, Slider, SliderClamping, Ui};
-use sunfleck::scene::settings::parse_count;
+use egui::{Response, Ui};
 
 /// Of the panel's width, for names.
 const NAMES: f32 = 0.36;
@@ -34,16 +31,22 @@ pub fn row(ui: &mut Ui, name: Name, is_changed: bool, control: impl FnOnce(&mut 
             })
             .inner;
         let room = (ui.available_width() - RESET - 4.0).max(40.0);
-        ui.allocate_ui_with_layout(egui::vec2(room, height), layout, |ui| {
-            ui.set_min_width(room);
-            ui.set_max_width(room);
-            control(ui).labelled_by(label.id).on_hover_text(name.hint)
-        });
+        let mut inside = within(ui, egui::vec2(room, height), layout);
+        control(&mut inside).labelled_by(label.id).on_hover_text(name.hint);
         if is_changed {
             reset = back(ui, name.name);
         }
     });
     reset
+}
+
+/// Room of this size, which nothing in it makes larger: a long number does not widen the panel.
+pub fn within(ui: &mut Ui, size: egui::Vec2, layout: egui::Layout) -> Ui {
+    let (_, rect) = ui.allocate_space(size);
+    let mut inside = ui.new_child(egui::UiBuilder::new().max_rect(rect).layout(layout));
+    // Highlights reach a little beyond.
+    inside.shrink_clip_rect(rect.expand(2.0));
+    inside
 }
 
 /// The way back, of something with a name; says whether it is taken.
@@ -63,45 +66,10 @@ pub fn back(ui: &mut Ui, name: &str) -> bool {
     response.on_hover_text("Back to what the file says").clicked()
 }
 
-/// A slider with its value beside it, in all of the room. What is typed may lie outside the range.
-pub fn slider(
-    ui: &mut Ui,
-    value: &mut f64,
-    range: RangeInclusive<f64>,
-    adjust: impl FnOnce(Slider) -> Slider,
-) -> Response {
-    const VALUE: f32 = 58.0;
-    ui.spacing_mut().slider_width = (ui.available_width() - VALUE - ui.spacing().item_spacing.x).max(24.0);
-    ui.spacing_mut().interact_size.x = VALUE;
-    let slider =
-        Slider::new(value, range).clamping(SliderClamping::Never).update_while_editing(false).trailing_fill(true);
-    ui.add(adjust(slider))
-}
-
 /// One of several numbers in a row, which only the first takes its name from: says its own.
 pub fn named(response: Response, name: &str) -> Response {
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, name));
     response
-}
-
-/// A length in metres, at least `least`; dragging changes it in proportion.
-pub fn metres(ui: &mut Ui, value: &mut f32, least: f32) -> Response {
-    let speed = f64::from(value.abs()).max(1e-3) * 0.01;
-    let drag = DragValue::new(value).speed(speed).range(least..=f32::MAX).suffix(" m").update_while_editing(false);
-    ui.add_sized(
-        egui::vec2(ui.available_width(), ui.spacing().interact_size.y),
-        drag.custom_formatter(|x, _| length_text(x)),
-    )
-}
-
-/// To four significant digits.
-fn length_text(metres: f64) -> String {
-    if metres == 0.0 || !metres.is_finite() {
-        return metres.to_string();
-    }
-    let digits = (3 - metres.abs().log10().floor() as i32).clamp(0, 9) as usize;
-    let text = format!("{metres:.digits$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
 /// One of a list; says whether another was chosen.
@@ -122,75 +90,4 @@ pub fn choice<T: Copy + PartialEq>(ui: &mut Ui, id: &str, value: &mut T, all: &[
         response.mark_changed();
     }
     response
-}
-
-/// A count as people write it: 500k, 1.5M.
-pub fn count_text(n: f64) -> String {
-    let (n, unit) = match n {
-        n if n >= 999_500.0 => (n / 1e6, "M"),
-        n if n >= 1000.0 => (n / 1e3, "k"),
-        n => (n, ""),
-    };
-    let digits = match n {
-        _ if unit.is_empty() => 0,
-        n if n < 9.995 => 2,
-        n if n < 99.95 => 1,
-        _ => 0,
-    };
-    let text = format!("{n:.digits$}");
-    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-    format!("{text}{unit}")
-}
-
-/// The other way.
-pub fn count_of(text: &str) -> Option<f64> {
-    parse_count(text).ok().map(f64::from)
-}
-
-/// To two significant digits: a count that a slider gave.
-pub fn rounded(n: f64) -> f64 {
-    let unit = 10_f64.powf(n.max(1.0).log10().floor() - 1.0).max(1.0);
-    (n / unit).round() * unit
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn counts_are_short() {
-        for (n, text) in [
-            (1.0, "1"),
-            (999.0, "999"),
-            (1000.0, "1k"),
-            (1500.0, "1.5k"),
-            (500_000.0, "500k"),
-            (999_600.0, "1M"),
-            (1_250_000.0, "1.25M"),
-            (20e6, "20M"),
-            (12.5e6, "12.5M"),
-        ] {
-            assert_eq!(count_text(n), text);
-        }
-        for n in [1.0, 700.0, 1000.0, 250_000.0, 1.5e6, 20e6] {
-            assert_eq!(count_of(&count_text(n)), Some(n));
-        }
-        assert_eq!(count_of("many"), None);
-    }
-
-    #[test]
-    fn lengths_are_short() {
-        for (metres, text) in
-            [(0.0, "0"), (0.591_425, "0.5914"), (0.002, "0.002"), (12.5, "12.5"), (123_456.7, "123457")]
-        {
-            assert_eq!(length_text(metres), text);
-        }
-    }
-
-    #[test]
-    fn sliders_give_round_counts() {
-        for (n, round) in [(1.0, 1.0), (12.4, 12.0), (123_456.0, 120_000.0), (987.0, 990.0), (1.26e6, 1.3e6)] {
-            assert_eq!(rounded(n), round);
-        }
-    }
 }

@@ -2,6 +2,7 @@
 
 mod camera;
 mod compare;
+mod fields;
 mod files;
 mod habits;
 mod panels;
