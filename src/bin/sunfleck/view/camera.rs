@@ -37,6 +37,9 @@ pub enum Pace {
     Fast,
 }
 
+/// Of cameras whose file has no word for it, metres.
+const UNFOCUSED: f32 = 1.0;
+
 /// A camera and what it is moved about.
 #[derive(Clone, Debug)]
 pub struct Rig {
@@ -233,10 +236,14 @@ impl Rig {
         }
     }
 
-    /// Radius of the lens, metres; 0 is a pinhole.
+    /// Radius of the lens, metres; 0 is a pinhole. A pinhole that nobody has focused has the pivot in focus as a lens.
     pub fn set_aperture_radius(&mut self, metres: f32) {
-        if metres.is_finite() {
-            self.camera.aperture_radius = metres.clamp(0.0, self.size);
+        if !metres.is_finite() {
+            return;
+        }
+        let before = std::mem::replace(&mut self.camera.aperture_radius, metres.clamp(0.0, self.size));
+        if before == 0.0 && metres > 0.0 && self.camera.focus_distance == UNFOCUSED {
+            self.set_focus_distance(self.depth());
         }
     }
 

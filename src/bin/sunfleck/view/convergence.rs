@@ -48,7 +48,7 @@ impl Kind {
             Self::Error => {
                 "relMSE: noise as estimated from the two halves of the iterations, in which a single bright pixel (a \
                  firefly) counts little and the blur of the radius nothing; against the reference, if there is one, \
-                 where one such pixel may rule; and the slopes of the theory (Knaus & Zwicker 2011)"
+                 where one such pixel may rule, and without the worst thousandth of the pixels (trimmed); and the slopes of the theory (Knaus & Zwicker 2011)"
             }
             Self::Radius => "median radius of the estimate",
             Self::Rate => "photon paths that leave the lamps, and photons that are stored, a second",
@@ -122,6 +122,7 @@ struct Sample {
     means: Vec<Record>,
     estimated: Vec<Measured>,
     against_reference: Vec<Measured>,
+    trimmed: Vec<Measured>,
 }
 
 impl Sample {
@@ -131,6 +132,7 @@ impl Sample {
             means: history.records.sample(MOST_MEANS),
             estimated: history.estimated.sample(MOST_POINTS),
             against_reference: history.against_reference.sample(MOST_POINTS),
+            trimmed: history.trimmed.sample(MOST_POINTS),
         }
     }
 }
@@ -323,6 +325,10 @@ fn curves(kind: Kind, sample: &Sample, alpha: f64, by_seconds: bool) -> Vec<Curv
                 let name = if by_seconds { "t" } else { "N" };
                 curves.push(Curve { name: format!("{name}^−{exponent:.2}"), points: slope, dashed: true });
             }
+            if !sample.trimmed.is_empty() {
+                let points = sample.trimmed.iter().map(|m| [at(m.iteration, m.seconds), m.rel_mse.log10()]).collect();
+                curves.push(solid("trimmed", points));
+            }
             curves
         }
         Kind::Radius => vec![of_records("radius", &|r| f64::from(r.radius).log10())],
@@ -436,6 +442,7 @@ mod tests {
             means: [1, 2, 10, 100].map(record).to_vec(),
             estimated: [10, 100].map(measured).to_vec(),
             against_reference: vec![],
+            trimmed: vec![],
         }
     }
 

@@ -292,3 +292,21 @@ fn keys_and_buttons() {
     rig.set_aperture_radius(f32::NAN);
     assert_eq!(rig.camera().aperture_radius, 0.02);
 }
+
+#[test]
+fn a_lens_is_focused_where_nobody_said() {
+    let bounds = [Vec3::splat(-100.0), Vec3::splat(100.0)];
+    let mut camera = Camera::look_at("", Vec3::Z * 300.0, Vec3::ZERO, Vec3::Y, 1.0);
+    for (said, expected) in [(1.0, 300.0), (7.0, 7.0)] {
+        camera.focus_distance = said;
+        let mut rig = Rig::new(&camera, bounds);
+        rig.set_aperture_radius(0.0);
+        assert_eq!(rig.camera().focus_distance, said);
+        rig.set_aperture_radius(0.5);
+        assert!((rig.camera().focus_distance - expected).abs() < 1e-3);
+        // A lens stays focused as it is.
+        rig.set_focus_distance(1.0);
+        rig.set_aperture_radius(0.6);
+        assert_eq!(rig.camera().focus_distance, 1.0);
+    }
+}

@@ -115,6 +115,8 @@ pub struct History {
     pub estimated: Series<Measured>,
     /// Against the reference.
     pub against_reference: Series<Measured>,
+    /// The same without the thousandth of the pixels that is worst: single bright ones rule the mean.
+    pub trimmed: Series<Measured>,
 }
 
 #[cfg(test)]

@@ -78,7 +78,7 @@ impl Task {
 
 /// Shows what was painted, and notes the errors of its film: estimated, and against the reference.
 fn publish(board: &mut Board, task: &Task, painted: Arc<Painted>, estimated: Option<f64>) {
-    let measured = painted.figures.map(|figures| figures.rel_mse);
+    let measured = painted.figures.map(|figures| [figures.rel_mse, figures.rel_mse_trimmed]);
     let frame = &task.frame;
     if board.frame.is_some() {
         board.painted = Some(painted);
@@ -92,8 +92,9 @@ fn publish(board: &mut Board, task: &Task, painted: Arc<Painted>, estimated: Opt
         board.history.estimated.push(point(rel_mse));
     }
     // Another reference may have been set in the meantime.
-    if let Some(rel_mse) = measured.filter(|_| is_same(task.reference.as_ref(), board.reference.as_ref())) {
-        board.history.against_reference.push(point(rel_mse));
+    if let Some([all, trimmed]) = measured.filter(|_| is_same(task.reference.as_ref(), board.reference.as_ref())) {
+        board.history.against_reference.push(point(all));
+        board.history.trimmed.push(point(trimmed));
     }
 }
 
