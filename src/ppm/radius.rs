@@ -54,7 +54,7 @@ pub struct FirstRadii {
     /// Metres, `[h·w]`, above 0.
     pub each: Vec<f32>,
     /// Whether it was chosen for what is there, `[h·w]`. Elsewhere the pilot's path had nothing to gather (a lamp, the sky),
-    /// and the radius is that of pixels nearby, for a later path that has.
+    /// and the radius is that of pixels nearby, for a later path that has. A radius that is given is so everywhere.
     pub gathers: Vec<bool>,
 }
 

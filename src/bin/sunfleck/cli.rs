@@ -202,7 +202,7 @@ pub struct ViewArgs {
     #[arg(value_name = "SCENE")]
     pub scene: Option<String>,
 
-    /// Where saving puts the picture without asking: .exr or .png
+    /// Where saving puts the picture of SCENE, or of the first that is opened, without asking: .exr or .png
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
 

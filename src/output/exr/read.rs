@@ -22,7 +22,8 @@ const MAX_BLOCK_BYTES: usize = 1 << 30;
 /// Every OpenEXR file begins with these.
 const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
-/// Reads a picture in full size, whoever wrote it, as far as it is in the display window.
+/// Reads a picture in full size, whoever wrote it, as far as it is in the display window. Not from a file with deep data,
+/// in whichever part.
 ///
 /// It is in the first part with channels `R`, `G` and `B`. If there is none, it is the one layer that has them, as in
 /// `Combined.R`, in either case, or `Y` as grey; of several layers, the one whose name ends in "Combined" or "beauty",
@@ -112,10 +113,7 @@ enum Channels {
 
 /// The part and its channels that are the picture: always the first part that has these channels.
 fn choose(headers: &[Header]) -> Result<(&Header, Channels), String> {
-    let parts = || headers.iter().filter(|header| !header.deep);
-    if parts().next().is_none() {
-        return Err("it has only deep data".into());
-    }
+    let parts = || headers.iter();
     let find = |header: &Header, name: &str| {
         let is_named = |c: &&Text| c.as_slice().eq_ignore_ascii_case(name.as_bytes());
         header.channels.list.iter().map(|c| &c.name).find(is_named).cloned()

@@ -217,7 +217,9 @@ fn only_item<'n, T: Item>(list: &mut Vec<T>, names: impl Iterator<Item = &'n str
     let own = own_name(names, index);
     let is_own = |item: &T| item.index() == Some(index) || (own.is_some() && item.name() == own.as_deref());
     let is_shared = |item: &T| item.name().is_some() && item.name() == name;
-    let Some(mut at) = list.iter().rposition(is_own) else {
+    // What changes this thing among others last is not changed by what comes before it.
+    let last = list.iter().rposition(|item| is_own(item) || is_shared(item));
+    let Some(mut at) = last.filter(|&at| is_own(&list[at])) else {
         let number = own.is_none().then_some(index);
         list.push(T::new(own, number));
         let last = list.len() - 1;

@@ -44,6 +44,33 @@ impl Settings {
         pairs
     }
 
+    /// What these settings were changed to since a file said `before`, over what it says `now`.
+    ///
+    /// A field that differs from `before` stays as it is here; tables are taken as wholes, and so are changes of a material
+    /// or of a light, each by the name or the number that it is of.
+    pub fn rebased(&self, before: &Self, now: &Self) -> Self {
+        let (mine, before, mut rebased) = (self.table(), before.table(), now.table());
+        let mut keys: Vec<&String> = mine.keys().chain(before.keys()).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        for key in keys {
+            let value = match key.as_str() {
+                "material" | "scene_light" => {
+                    let items = |table: &Table| table.get(key).and_then(Value::as_array).cloned().unwrap_or_default();
+                    Some(Value::Array(rebased_items(&items(&mine), &items(&before), items(&rebased))))
+                }
+                _ if mine.get(key) == before.get(key) => continue,
+                _ => mine.get(key).cloned(),
+            };
+            match value {
+                Some(value) => rebased.insert(key.clone(), value),
+                None => rebased.remove(key),
+            };
+        }
+        // Each value is one of three settings that are valid.
+        rebased.try_into().unwrap_or_else(|_| self.clone())
+    }
+
     fn table(&self) -> Table {
         let mut table = Table::try_from(self).expect("numbers, text, lists and tables, which TOML has");
         for (key, value) in &mut table {
@@ -54,6 +81,28 @@ impl Settings {
         }
         table
     }
+}
+
+/// See [`Settings::rebased`].
+fn rebased_items(mine: &[Value], before: &[Value], mut now: Vec<Value>) -> Vec<Value> {
+    let of = |item: &Value| (item.get("name").cloned(), item.get("index").cloned());
+    let all = |items: &[Value], like: &Value| -> Vec<Value> {
+        items.iter().filter(|item| of(item) == of(like)).cloned().collect()
+    };
+    let mut done: Vec<Value> = vec![];
+    for item in mine.iter().chain(before) {
+        if !all(&done, item).is_empty() {
+            continue;
+        }
+        done.push(item.clone());
+        let (is, was) = (all(mine, item), all(before, item));
+        if is != was {
+            let at = now.iter().position(|other| of(other) == of(item)).unwrap_or(now.len());
+            now.retain(|other| of(other) != of(item));
+            now.splice(at..at, is);
+        }
+    }
+    now
 }
 
 /// Overrides on the way from one value to another, each tried as it is added.

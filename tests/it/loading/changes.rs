@@ -491,3 +491,34 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn changes_by_hand_are_taken_over_to_another_file() {
+    let parse = |text: &str| Settings::parse(text, "a.toml".as_ref()).unwrap();
+    let before = parse(
+        "alpha = 0.6\nphotons = 200\nseed = 3\n[camera]\nyfov_degrees = 40\n\
+         [[material]]\nname = \"a\"\nroughness = 0.1\n[[material]]\nname = \"b\"\nior = 1.2\n\
+         [[scene_light]]\nindex = 3\nstrength = 2\n",
+    );
+    let now = parse(
+        "alpha = 0.8\nphotons = 300\nseed = 3\n[camera]\nyfov_degrees = 50\n\
+         [[material]]\nname = \"new\"\nmetallic = 1\n[[material]]\nname = \"a\"\nroughness = 0.2\n\
+         [[scene_light]]\nindex = 1\non = false\n[[scene_light]]\nindex = 3\nstrength = 2\n",
+    );
+    assert_eq!(before.rebased(&before, &now), now);
+    let mut mine = before.clone();
+    for pair in ["photons=7", "seed=", "material.b.ior=1.4", "material.c.roughness=0.5", "scene_light.0.strength=5"] {
+        mine.set(pair).unwrap();
+    }
+    let rebased = mine.rebased(&before, &now);
+    let expected = parse(
+        "alpha = 0.8\nphotons = 7\n[camera]\nyfov_degrees = 50\n\
+         [[material]]\nname = \"new\"\nmetallic = 1\n[[material]]\nname = \"a\"\nroughness = 0.2\n\
+         [[material]]\nname = \"b\"\nior = 1.4\n[[material]]\nname = \"c\"\nroughness = 0.5\n\
+         [[scene_light]]\nindex = 1\non = false\n[[scene_light]]\nindex = 3\nstrength = 5\n",
+    );
+    assert_eq!(rebased, expected, "{}", rebased.to_toml());
+    // Taken out by hand, and changed in the file meanwhile.
+    mine.set("material.0=").unwrap();
+    assert!(mine.rebased(&before, &now).materials.iter().all(|m| m.name.as_deref() != Some("a")));
+}

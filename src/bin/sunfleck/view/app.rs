@@ -89,8 +89,6 @@ pub struct Viewer {
     /// What there is; taken from the engine before every frame.
     pub now: Now,
     pub edits: Edits,
-    /// Whether what is being read is what was open, to be edited on.
-    keeps_edits: bool,
     pub remembered: Remembered,
     /// Whether it has been in a window.
     entered: bool,
@@ -139,7 +137,6 @@ impl Viewer {
             wanted,
             now,
             edits: Edits::default(),
-            keeps_edits: false,
             remembered: Remembered::default(),
             entered: false,
             picture: PictureView::default(),
@@ -192,17 +189,14 @@ impl Viewer {
             self.previous = self.wanted.scene.clone();
         }
         self.wanted.scene = Some(Arc::new(Choice { name: name.into(), set: self.always.clone() }));
-        if let Some((scene @ None, _)) = &mut self.saved_as {
-            scene.clone_from(&self.wanted.scene);
-        }
-        (self.wanted.settings, self.keeps_edits) = (None, false);
+        (self.wanted.settings, self.wanted.reads_again) = (None, false);
         self.wanted.reloads += 1;
     }
 
     /// Opens what was open before.
     pub fn back(&mut self) {
         self.wanted.scene = self.previous.take();
-        (self.wanted.settings, self.keeps_edits) = (None, false);
+        (self.wanted.settings, self.wanted.reads_again) = (None, false);
         self.wanted.reloads += 1;
     }
 
@@ -217,7 +211,7 @@ impl Viewer {
 
     /// Reads the scene's file again; what was changed stays changed.
     pub fn reload(&mut self) {
-        self.keeps_edits = true;
+        self.wanted.reads_again = true;
         self.wanted.reloads += 1;
     }
 
@@ -264,7 +258,7 @@ impl Viewer {
     /// Brightens the picture by so many stops.
     pub fn expose(&mut self, ui: &egui::Ui, stops: f32) {
         let now = self.look().exposure.or(self.now.painted.as_ref().map(|painted| painted.exposure));
-        self.show_otherwise(ui, "exposure", |s| s.exposure = Some(now.unwrap_or(0.0) + stops));
+        self.show_otherwise(ui, "exposure", |s| s.exposure = Some((now.unwrap_or(0.0) + stops).clamp(-64.0, 64.0)));
     }
 
     /// Changes settings that only say how the picture is shown: nothing is rendered for it.
@@ -351,27 +345,6 @@ impl Viewer {
     /// Where saving goes without asking.
     pub fn place(&self) -> Option<&PathBuf> {
         self.saved_as.as_ref().filter(|(scene, _)| *scene == self.wanted.scene).map(|(_, path)| path)
-    }
-
-    /// Applies what was changed since the file said `before` to what it says `now`, and so in every step of undo.
-    fn keep_edits(&mut self, before: &Settings, now: &Settings) {
-        if before == now {
-            return;
-        }
-        let mut lost = None;
-        self.edits.map(|settings| {
-            let mut rebased = now.clone();
-            for pair in settings.difference(before) {
-                if let Err(error) = rebased.set(&pair) {
-                    lost = Some(format!("{pair}: {error}"));
-                }
-            }
-            rebased
-        });
-        if let Some(what) = lost {
-            self.messages.say(0.0, Message::Warning(format!("cannot be kept with what the file says now: {what}")));
-        }
-        self.wanted.settings = Some(Arc::clone(self.edits.now()));
     }
 
     /// Shows a message.
@@ -473,12 +446,20 @@ impl Viewer {
             self.picture.forget();
             if let Some(opened) = self.editing.clone() {
                 self.remembered.opened(&opened.source.name);
-                match before.filter(|before| self.keeps_edits && before.choice == opened.choice) {
-                    Some(before) => self.keep_edits(&before.source.settings, &opened.source.settings),
+                let settings = &opened.source.settings;
+                match before.filter(|before| self.wanted.reads_again && before.choice == opened.choice) {
+                    Some(before) => {
+                        self.edits.map(|edited| edited.rebased(&before.source.settings, settings));
+                        self.wanted.settings = self.wanted.settings.take().map(|_| Arc::clone(self.edits.now()));
+                    }
                     None => {
-                        self.edits = Edits::new(opened.source.settings.clone());
+                        self.edits = Edits::new(settings.clone());
+                        self.wanted.settings = None;
                         self.picture = PictureView::default();
                     }
+                }
+                if let Some((scene @ None, _)) = &mut self.saved_as {
+                    *scene = Some(Arc::clone(&opened.choice));
                 }
             }
         }

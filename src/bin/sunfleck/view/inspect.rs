@@ -303,7 +303,7 @@ fn cursor(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
             gathered,
             "Gathered by an iteration, on average; a view or photons that need them must be on",
         );
-        let radius = film.and_then(|(painted, i, ..)| {
+        let radius = film.filter(|_| hit.is_some()).and_then(|(painted, i, ..)| {
             let FirstRadii { each, gathers } = &*painted.frame.first_radii;
             gathers.get(i)?.then(|| each[i] * shrunk(painted))
         });

@@ -43,7 +43,7 @@ pub const SHORTCUTS: &[Shortcut] = &[
     command_shift(Key::Z, "redo", |_, v| v.redo()),
     command(Key::O, "open a scene", |_, v| files::open(v)),
     command(Key::S, "save the picture", |_, v| files::save(v)),
-    command(Key::R, "read the scene again", |_, v| v.reload()),
+    command(Key::R, "read the scene again; what was changed stays", |_, v| v.reload()),
     command(Key::W, "close the scene", |_, v| v.close_scene()),
     command(Key::Q, "quit", |ui, _| ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close)),
     command(Key::Z, "undo", |_, v| v.undo()),
@@ -124,7 +124,7 @@ pub fn handle(ui: &mut egui::Ui, viewer: &mut Viewer) {
         egui::Event::Key { key, pressed: true, modifiers, .. } if modifiers.command || modifiers.alt => Some(*key),
         _ => None,
     };
-    if !typing && !viewer.picture.flying {
+    if !typing && !viewer.picture.flying && !ui.input(|i| i.pointer.secondary_down()) {
         ui.input(|i| viewer.picture.not_flying.extend(i.events.iter().filter_map(modified)));
     }
     // In a field, and with Ctrl, undo among it, a held key does again what it does.

@@ -63,8 +63,10 @@ pub struct Choice {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Wanted {
     pub scene: Option<Arc<Choice>>,
-    /// Counts requests to read the scene again.
+    /// Counts requests to read the scene, or to read it again.
     pub reloads: u32,
+    /// What is read is what was open: it stays on view meanwhile, and what was changed stays changed.
+    pub reads_again: bool,
     /// In the place of those that the scene was opened with.
     pub settings: Option<Arc<Settings>>,
     /// The camera is moving: quick previews instead of the picture.

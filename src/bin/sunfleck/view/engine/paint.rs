@@ -263,8 +263,12 @@ impl Painter {
         self.hits.is_none() && self.halves.1 == Halves::default()
     }
 
-    /// Error estimated from the halves, and measured against the reference.
-    pub fn measure(&mut self, frame: &Frame, reference: Option<&Reference>) -> (Option<f64>, Option<Difference>) {
+    /// Error estimated from the halves, and measured against the reference, or why it cannot be.
+    pub fn measure(
+        &mut self,
+        frame: &Frame,
+        reference: Option<&Arc<Reference>>,
+    ) -> (Option<f64>, Option<Result<Difference, String>>) {
         // What another scene left would keep that scene in memory.
         self.hits = self.hits.take().filter(|(of, _)| Arc::ptr_eq(&of.scene, &frame.scene));
         if frame.is_preview {
@@ -274,7 +278,7 @@ impl Painter {
             self.halves = (frame.estimate, Halves::default());
         }
         self.halves.1.add(&frame.film);
-        let measured = reference.and_then(|r| compare(&frame.picture(), &r.picture).ok());
+        let measured = fitting(reference, frame).map(|r| compare(&frame.picture(), &r.picture));
         (self.halves.1.rel_mse(), measured)
     }
 

@@ -30,9 +30,13 @@ pub fn run(shared: &Shared) {
             continue;
         };
         let mut work = || {
-            let (estimated, figures) = painter.measure(&task.frame, task.reference.as_deref());
+            let (estimated, figures) = painter.measure(&task.frame, task.reference.as_ref());
             let mut painted = painter.paint(&task.frame, task.reference.clone(), task.painting);
-            painted.figures = figures;
+            match figures {
+                Some(Ok(figures)) => painted.figures = Some(figures),
+                Some(Err(why)) => painted.problem = Some(why),
+                None => {}
+            }
             painted.reduce(task.most_side);
             (Arc::new(painted), estimated)
         };

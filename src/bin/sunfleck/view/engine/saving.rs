@@ -29,7 +29,9 @@ impl Save {
         if self.scene != board.wanted.scene {
             return Some(Err("its scene was left before there was a picture of it"));
         }
-        let frame = board.frame.as_ref().filter(|frame| Some(&frame.opened.choice) == self.scene.as_ref());
+        // What is read again may be another picture.
+        let is_of = |frame: &&Arc<Frame>| Some(&frame.opened.choice) == self.scene.as_ref();
+        let frame = board.frame.as_ref().filter(is_of).filter(|_| board.phase != Phase::Loading || board.quit);
         let has_failed = matches!(board.phase, Phase::Failed(_));
         match frame.filter(|frame| !frame.is_preview || has_failed) {
             Some(frame) => Some(Ok(Arc::clone(frame))),

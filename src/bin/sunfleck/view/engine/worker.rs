@@ -116,10 +116,11 @@ impl Have {
             device.recover()?;
         }
         if reads {
-            // The memory of the old one first; of the same scene, read again, the picture stays, for the file may be broken.
-            (self.session, self.opened) = (None, None);
+            // The memory of the device first; of a scene that is read again the picture stays, for the file may be broken.
+            let opened_before = self.opened.take();
+            self.session = None;
             shared.update(|board| {
-                if before.scene != wanted.scene {
+                if !(wanted.reads_again && before.scene == wanted.scene) {
                     (board.opened, board.frame, board.painted) = (None, None, None);
                 }
                 board.phase = if wanted.scene.is_some() { Phase::Loading } else { Phase::Empty };
@@ -131,11 +132,18 @@ impl Have {
             };
             let opened = Arc::new(opened);
             self.opened = Some(Arc::clone(&opened));
+            // As the interface will, when it sees the file.
+            let mut wanted = wanted.clone();
+            if let (Some(edited), Some(before), true) = (&mut wanted.settings, opened_before, wanted.reads_again) {
+                *edited = Arc::new(edited.rebased(&before.source.settings, &opened.source.settings));
+            }
+            self.wanted = wanted.clone();
             shared.update(|board| {
                 board.messages.extend(device.cannot(&opened.source).into_iter().map(Message::Warning));
-                board.opened = Some(opened);
+                (board.opened, board.frame, board.painted) = (Some(opened), None, None);
+                board.wanted.settings.clone_from(&wanted.settings);
             });
-            return self.prepare(shared, device, wanted);
+            return self.prepare(shared, device, &wanted);
         }
         if is_stale || is_retry {
             let same = self.opened.as_ref().is_some_and(|opened| is_rendered_alike(opened, &before, wanted));

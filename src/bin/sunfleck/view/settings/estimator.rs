@@ -163,7 +163,7 @@ fn radius(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, now: &Settings) {
     let size = viewer.scene_size();
     if let Some(radius) = &mut fixed {
         row(ui, FIXED_RADIUS, false, |ui| {
-            let response = metres(ui, radius, 1e-6 * size, size);
+            let response = metres(ui, radius, 1e-9, size);
             changed |= response.changed();
             response
         });

@@ -27,7 +27,7 @@ const TRANSMISSION: Name = Name {
 };
 const SPECULAR: Name = Name {
     name: "Specular",
-    hint: "Weight of the reflection of paint, plastic or glass, from 0, none, to 1. Restarts the estimate.",
+    hint: "Weight of the reflection of paint or plastic, from 0, none, to 1. Restarts the estimate.",
 };
 const IOR: Name = Name {
     name: "Refraction",

@@ -37,7 +37,10 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer) {
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             let is_changed = **viewer.edits.now() != *read;
             let button = ui.add_enabled(is_changed, egui::Button::new("Reset all").small());
-            if button.on_hover_text("Back to what the file says. Restarts the estimate.").clicked() {
+            if button
+                .on_hover_text("Back to what the file says. Restarts the estimate if it changes what is rendered.")
+                .clicked()
+            {
                 viewer.reset(ui, |s| *s = read.clone());
             }
         });

@@ -78,7 +78,7 @@ pub const NO_LIMIT: &str = "no limit";
 
 /// A whole number in a box of this size.
 pub fn whole(ui: &mut Ui, size: egui::Vec2, drag: DragValue<'_>) -> Response {
-    let read = |text: &str| if text.trim() == NO_LIMIT { Some(0.0) } else { text.trim().parse().ok() };
+    let read = |text: &str| if text.trim() == NO_LIMIT { Some(0.0) } else { Number::Plain.read(text) };
     let drag = drag.update_while_editing(false).clip_text(true).clamp_existing_to_range(false);
     ui.add_sized(size, drag.custom_parser(read))
 }

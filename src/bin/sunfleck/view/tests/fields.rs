@@ -83,6 +83,7 @@ fn drag(window: &mut Window, from: Pos2, way: f32) {
 fn awkward(settings: &mut Settings) {
     settings.photons = Some(Count(54_321));
     settings.light_scale = Some(0.000_412_3);
+    settings.exposure = Some(1.0 / 3.0);
     settings.seed = Some(4_000_000_007);
     settings.max_segments = Some(5000);
     settings.radius = Some(FirstRadius::Fixed(2e-9));
@@ -96,7 +97,6 @@ fn visiting_a_field_changes_nothing() {
     let camera = CameraSettings::from(&window.viewer().camera().unwrap());
     let focus = CameraSettings { focus_distance: Some(0.591_425_36), aperture_radius: Some(0.001_234_567), ..camera };
     window.viewer().edit_at(10.0, "test", |s| s.camera = Some(focus));
-    window.viewer().wanted.painting.look.exposure = Some(1.0 / 3.0);
     window.steps(2);
     assert_eq!(window.viewer().edits.now().max_segments, Some(5000), "only shown");
     let seen = |window: &mut Window| (window.viewer().edits.now().clone(), window.viewer().wanted.painting);

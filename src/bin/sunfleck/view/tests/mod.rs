@@ -100,7 +100,12 @@ impl Window {
             let n = |frame: &super::engine::Frame| !frame.is_preview && frame.film.n_iterations == ITERATIONS;
             viewer.now.phase == Phase::Reached
                 && !viewer.wanted.moving
-                && viewer.picture.painted().is_some_and(|painted| n(&painted.frame))
+                && viewer.picture.painted().is_some_and(|painted| {
+                    let frame = &painted.frame;
+                    n(frame)
+                        && frame.estimate == viewer.now.estimate
+                        && Arc::ptr_eq(&frame.opened, viewer.opened().unwrap())
+                })
         });
     }
 

@@ -153,6 +153,7 @@ const CASES: &[Case] = &[
     ),
     case(COMMAND, Key::R, |seen, window| {
         seen.wanted.reloads += 1;
+        seen.wanted.reads_again = true;
         window.wait_for_picture();
     }),
     case(COMMAND, Key::W, |seen, window| {
