@@ -113,9 +113,9 @@ pub struct Viewer {
     pub messages: Messages,
     pub show_help: bool,
     pub held: super::keys::Held,
-    /// Whether a field had the keys in the frame before.
-    pub was_typing: bool,
-    /// Whether a field was left by Escape in the frame before.
+    /// Whether a field, a button or the like had the keys in the frame before.
+    pub had_focus: bool,
+    /// Whether it was left by Escape then.
     pub escaped: bool,
     pub dialog: Option<files::Dialog>,
     /// To be read.
@@ -153,7 +153,7 @@ impl Viewer {
             messages: Messages::default(),
             show_help: false,
             held: Default::default(),
-            was_typing: false,
+            had_focus: false,
             escaped: false,
             dialog: None,
             reference: first.reference,
@@ -388,7 +388,8 @@ impl Viewer {
         if self.editing.is_some() {
             let width = ui.content_rect().width();
             // Of a panel, so that the picture keeps some room between two.
-            let most = (0.5 * (width - LEAST_PICTURE)).clamp(200.0, 500.0);
+            let n_beside = f32::from(self.remembered.show_settings) + f32::from(self.shows_inspect(width));
+            let most = ((width - LEAST_PICTURE) / n_beside.max(1.0)).clamp(200.0, 500.0);
             if self.remembered.show_convergence {
                 let panel =
                     egui::Panel::bottom("convergence").resizable(true).default_size(220.0).size_range(120.0..=600.0);

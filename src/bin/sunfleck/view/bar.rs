@@ -3,6 +3,8 @@
 use eframe::egui;
 use egui::{Button, DragValue};
 
+use sunfleck::scene::settings::parse_count;
+
 use super::app::Viewer;
 use super::engine::{Limits, Phase};
 use super::files;
@@ -135,14 +137,17 @@ fn limits(ui: &mut egui::Ui, limits: &mut Limits) {
         noise: limits.noise.unwrap_or(off.noise),
     };
     let is_on = [limits.iterations.is_some(), limits.seconds.is_some(), limits.noise.is_some()];
+    // Nothing half typed stops the run, and all digits are shown: what is shown is read when a field is left.
+    let whole = |text: &str| parse_count(text.trim()).ok().map(f64::from);
     let n = DragValue::new(&mut numbers.iterations).range(1..=u32::MAX).speed(1.0).suffix(" iterations");
+    let n = n.update_while_editing(false).custom_parser(whole);
     let iterations = limit(ui, is_on[0], "iterations", "Stop after so many iterations since the restart", n);
     let s = DragValue::new(&mut numbers.seconds).range(0.1..=1e7).speed(0.5).suffix(" s");
+    let s = s.update_while_editing(false).custom_formatter(|seconds, _| seconds.to_string());
     let seconds = limit(ui, is_on[1], "seconds", "Stop after so many seconds since the restart, pauses left out", s);
     let speed = 0.01 * numbers.noise;
     let e = DragValue::new(&mut numbers.noise).range(1e-9..=1.0).speed(speed).prefix("noise ");
-    // All digits: what is shown is what is read when the field is left.
-    let e = e.custom_formatter(|noise, _| format!("{noise:e}"));
+    let e = e.update_while_editing(false).custom_formatter(|noise, _| format!("{noise:e}"));
     let noise = limit(
         ui,
         is_on[2],

@@ -48,6 +48,8 @@ pub struct Rig {
     up: Vec3,
     /// Diagonal of the scene's bounds, metres, positive.
     size: f32,
+    /// Whether the distance in focus was chosen by somebody.
+    is_focused: bool,
 }
 
 impl Rig {
@@ -55,7 +57,9 @@ impl Rig {
     ///
     /// The pivot lies in the middle of the picture, as deep as the scene's middle if that is in front.
     pub fn new(camera: &Camera, bounds: [Vec3; 2]) -> Self {
-        let mut rig = Self { camera: camera.clone(), pivot: Vec3::ZERO, up: Vec3::Y, size: size(bounds) };
+        let is_focused = camera.focus_distance != UNFOCUSED || camera.aperture_radius > 0.0;
+        let size = size(bounds);
+        let mut rig = Self { camera: camera.clone(), pivot: Vec3::ZERO, up: Vec3::Y, size, is_focused };
         let [right, above, forward] = rig.frame();
         let axis = camera.up_axis();
         rig.up = if right.dot(axis).abs() > TILTED { above } else { along(axis, above) };
@@ -72,6 +76,12 @@ impl Rig {
         if right.dot(axis).abs() <= TILTED && above.dot(axis).abs() > TILTED {
             self.up = along(axis, above);
         }
+        self
+    }
+
+    /// With a distance in focus that somebody chose, if it `is`, or seems, so.
+    pub fn focused(mut self, is: bool) -> Self {
+        self.is_focused |= is;
         self
     }
 
@@ -233,6 +243,7 @@ impl Rig {
     pub fn set_focus_distance(&mut self, metres: f32) {
         if metres.is_finite() {
             self.camera.focus_distance = metres.clamp(self.nearest(), MAX_COORDINATE);
+            self.is_focused = true;
         }
     }
 
@@ -242,7 +253,7 @@ impl Rig {
             return;
         }
         let before = std::mem::replace(&mut self.camera.aperture_radius, metres.clamp(0.0, self.size));
-        if before == 0.0 && metres > 0.0 && self.camera.focus_distance == UNFOCUSED {
+        if before == 0.0 && metres > 0.0 && !self.is_focused {
             self.set_focus_distance(self.depth());
         }
     }

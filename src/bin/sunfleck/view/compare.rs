@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use eframe::egui;
-use egui::{Color32, Key, Rect, Stroke, pos2};
+use egui::{Color32, Key, PointerButton, Rect, Stroke, pos2};
 use sunfleck::output;
 use sunfleck::output::difference::Measure;
 use sunfleck::output::tonemap::ToneMap;
@@ -253,7 +253,7 @@ pub fn overlay(ui: &egui::Ui, viewer: &mut Viewer, painter: &egui::Painter, rect
     if response.hovered() || response.dragged() {
         ui.ctx().set_cursor_icon(egui::CursorIcon::ResizeHorizontal);
     }
-    if let (true, Some(pointer)) = (response.dragged(), response.interact_pointer_pos()) {
+    if let (true, Some(pointer)) = (response.dragged_by(PointerButton::Primary), response.interact_pointer_pos()) {
         view.wipe = ((pointer.x - rect.left()) / rect.width()).clamp(0.0, 1.0);
         ui.ctx().request_repaint();
     }
@@ -262,7 +262,7 @@ pub fn overlay(ui: &egui::Ui, viewer: &mut Viewer, painter: &egui::Painter, rect
 
 /// Whether the reference is to be seen in the place of the picture: Shift, and nothing else.
 fn is_asked_for(ui: &egui::Ui, held: &Held, visible: Rect) -> bool {
-    if ui.ctx().egui_wants_keyboard_input() {
+    if ui.ctx().text_edit_focused() {
         return false;
     }
     ui.input(|i| {

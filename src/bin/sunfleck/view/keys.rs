@@ -70,9 +70,9 @@ pub const SHORTCUTS: &[Shortcut] = &[
     key(Key::F3, "convergence, shown or hidden", |_, v| v.remembered.show_convergence ^= true),
     key(Key::F12, "save a picture of the window", |ui, v| files::screenshot(ui, v)),
     key(Key::Questionmark, "this help", |_, v| v.show_help ^= true),
-    key(Key::Escape, "close the help, select nothing", |_, v| {
-        v.show_help = false;
-        v.selected = None;
+    key(Key::Escape, "close the help, else select nothing", |_, v| match v.show_help {
+        true => v.show_help = false,
+        false => v.selected = None,
     }),
 ];
 
@@ -113,13 +113,14 @@ impl Held {
 
 /// Does what was asked for by keys, unless they are typed into a field.
 pub fn handle(ui: &mut egui::Ui, viewer: &mut Viewer) {
-    let typing = ui.ctx().egui_wants_keyboard_input();
-    // What a field or a menu does with Escape comes first. egui has taken the field's focus by now.
-    let was_typing = std::mem::replace(&mut viewer.was_typing, typing);
-    let escaped = was_typing && !typing && ui.input(|i| i.key_pressed(Key::Escape));
+    let typing = ui.ctx().text_edit_focused();
+    // What has the focus, a field or a menu does with Escape comes first. egui has taken the focus by now.
+    let has_focus = ui.ctx().egui_wants_keyboard_input();
+    let had_focus = std::mem::replace(&mut viewer.had_focus, has_focus);
+    let escaped = had_focus && !has_focus && ui.input(|i| i.key_pressed(Key::Escape));
     // In the next frame, too: there a number field of egui 0.37 still counts as just left, and would take what was typed.
     let escaped_before = std::mem::replace(&mut viewer.escaped, escaped);
-    let escapes = !was_typing && !escaped_before && !egui::Popup::is_any_open(ui.ctx());
+    let escapes = !had_focus && !escaped_before && !egui::Popup::is_any_open(ui.ctx());
     let modified = |event: &egui::Event| match event {
         egui::Event::Key { key, pressed: true, modifiers, .. } if modifiers.command || modifiers.alt => Some(*key),
         _ => None,
@@ -151,6 +152,8 @@ pub fn handle(ui: &mut egui::Ui, viewer: &mut Viewer) {
         let n_presses = match keys.logical_key {
             Key::Questionmark => ui.input(|i| i.num_presses(Key::Questionmark)),
             Key::Escape if !escapes => 0,
+            // Presses the button that has the focus.
+            Key::Space if has_focus => 0,
             key => ui.input_mut(|i| i.count_and_consume_key(keys.modifiers, key)),
         };
         // A frame may take longer than two presses.

@@ -297,7 +297,7 @@ fn move_camera(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, response: &egui::
             act(viewer, &mut |rig| rig.zoom(wheel * WHEEL, cursor, under));
         }
     }
-    let typing = ui.ctx().egui_wants_keyboard_input();
+    let typing = ui.ctx().text_edit_focused();
     let was_flying = viewer.picture.flying;
     let not_flying = &mut viewer.picture.not_flying;
     let direction = if typing { Vec3::ZERO } else { ui.input(|i| flight(i, was_flying, not_flying)) };
@@ -359,8 +359,10 @@ impl Viewer {
                     false => Rig::new(&camera, bounds).turning_about(rig.up()),
                 },
                 None => {
-                    let axis = self.opened()?.loaded.scene.cameras.first().map_or(Vec3::Y, Camera::up_axis);
-                    Rig::new(&camera, bounds).turning_about(axis)
+                    let opened = self.opened()?;
+                    let axis = opened.loaded.scene.cameras.first().map_or(Vec3::Y, Camera::up_axis);
+                    let says_focus = opened.read.camera.as_ref().is_some_and(|camera| camera.focus_distance.is_some());
+                    Rig::new(&camera, bounds).turning_about(axis).focused(says_focus)
                 }
             };
             self.picture.rig = Some((settings, rig));

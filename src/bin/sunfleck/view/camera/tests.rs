@@ -304,9 +304,13 @@ fn a_lens_is_focused_where_nobody_said() {
         assert_eq!(rig.camera().focus_distance, said);
         rig.set_aperture_radius(0.5);
         assert!((rig.camera().focus_distance - expected).abs() < 1e-3);
-        // A lens stays focused as it is.
+        // What somebody chose stays, and be it 1 m.
         rig.set_focus_distance(1.0);
+        rig.set_aperture_radius(0.0);
         rig.set_aperture_radius(0.6);
         assert_eq!(rig.camera().focus_distance, 1.0);
+        let mut rig = Rig::new(&camera, bounds).focused(true);
+        rig.set_aperture_radius(0.5);
+        assert_eq!(rig.camera().focus_distance, said);
     }
 }

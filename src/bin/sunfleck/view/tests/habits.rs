@@ -280,3 +280,44 @@ fn the_reference_has_numbers_of_its_own() {
     window.viewer().wanted.painting.comparison = Comparison::Difference(Measure::Absolute);
     window.wait("difference", |viewer| viewer.picture.painted().is_some_and(|p| p.mean.is_some_and(|mean| mean > 0.0)));
 }
+
+/// Not typed into: only what a button does with its keys is the button's.
+#[test]
+fn shortcuts_work_whatever_has_the_focus() {
+    let mut window = Window::with_picture();
+    let button = window.harness.get_by_label("Step");
+    button.focus();
+    window.steps(2);
+    assert!(window.harness.ctx.memory(|memory| memory.focused().is_some()));
+    window.press(Modifiers::NONE, Key::V);
+    assert_ne!(window.viewer().wanted.painting.view, View::Picture);
+    let (steps, restarts) = (window.viewer().wanted.steps, window.viewer().wanted.restarts);
+    window.press(Modifiers::NONE, Key::Space);
+    window.steps(2);
+    assert_eq!((window.viewer().wanted.steps, window.viewer().wanted.restarts), (steps + 1, restarts));
+}
+
+#[test]
+fn limits_wait_for_the_whole_number() {
+    let mut window = Window::with_picture();
+    let before = window.viewer().wanted.limits;
+    let field = |window: &mut Window, text: &str, end: Key| {
+        window
+            .harness
+            .get_all_by_role(egui::accesskit::Role::SpinButton)
+            .find(|node| node.rect().top() < 30.0)
+            .unwrap()
+            .click();
+        window.steps(3);
+        for letter in text.chars() {
+            window.harness.input_mut().events.push(Event::Text(letter.to_string()));
+            window.step();
+        }
+        window.press(Modifiers::NONE, end);
+        window.steps(3);
+    };
+    field(&mut window, "1000", Key::Escape);
+    assert_eq!(window.viewer().wanted.limits, before);
+    field(&mut window, "20k", Key::Enter);
+    assert_eq!(window.viewer().wanted.limits.iterations, Some(20_000));
+}

@@ -240,7 +240,12 @@ const CASES: &[Case] = &[
         |window| (window.viewer().show_help, window.viewer().selected) = (true, Some(0)),
         Modifiers::NONE,
         Key::Escape,
-        |seen, _| (seen.help, seen.selected) = (false, None),
+        |seen, window| {
+            seen.help = false;
+            assert_eq!(Seen::of(window), *seen);
+            window.press(Modifiers::NONE, Key::Escape);
+            seen.selected = None;
+        },
     ),
     case(Modifiers::NONE, Key::V, paints_otherwise),
     case(SHIFT, Key::V, paints_otherwise),
