@@ -112,11 +112,7 @@ pub struct Viewer {
     title: String,
     pub messages: Messages,
     pub show_help: bool,
-    pub held: super::keys::Held,
-    /// Whether a field, a button or the like had the keys in the frame before.
-    pub had_focus: bool,
-    /// Whether it was left by Escape then.
-    pub escaped: bool,
+    pub keyboard: super::keys::Keyboard,
     pub dialog: Option<files::Dialog>,
     /// To be read.
     reference: Option<PathBuf>,
@@ -152,9 +148,7 @@ impl Viewer {
             title: String::new(),
             messages: Messages::default(),
             show_help: false,
-            held: Default::default(),
-            had_focus: false,
-            escaped: false,
+            keyboard: Default::default(),
             dialog: None,
             reference: first.reference,
             pick: Arc::new(files::pick),

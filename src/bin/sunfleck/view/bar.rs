@@ -2,7 +2,6 @@
 
 use eframe::egui;
 use egui::{Button, DragValue};
-
 use sunfleck::scene::settings::parse_count;
 
 use super::app::Viewer;
@@ -148,13 +147,9 @@ fn limits(ui: &mut egui::Ui, limits: &mut Limits) {
     let speed = 0.01 * numbers.noise;
     let e = DragValue::new(&mut numbers.noise).range(1e-9..=1.0).speed(speed).prefix("noise ");
     let e = e.update_while_editing(false).custom_formatter(|noise, _| format!("{noise:e}"));
-    let noise = limit(
-        ui,
-        is_on[2],
-        "noise",
-        "Stop when the estimated relMSE is as low as this. In it a single bright pixel (a firefly) counts little, and the blur of the radius nothing.",
-        e,
-    );
+    let help = "Stop when the estimated relMSE is as low as this. In it a single bright pixel (a firefly) counts little, \
+                and the blur of the radius nothing.";
+    let noise = limit(ui, is_on[2], "noise", help, e);
     limits.iterations = iterations.then_some(numbers.iterations);
     limits.seconds = seconds.then_some(numbers.seconds);
     limits.noise = noise.then_some(numbers.noise);

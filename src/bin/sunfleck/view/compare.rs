@@ -14,7 +14,7 @@ use super::charts::short;
 use super::engine::{Comparison, Message, Painted, Reference, View, is_same};
 use super::files;
 use super::inspect::{row, table};
-use super::keys::Held;
+use super::keys::Keyboard;
 
 /// Half the width of what the line of the wipe is held by, points.
 const HOLD: f32 = 6.0;
@@ -220,7 +220,7 @@ pub fn overlay(ui: &egui::Ui, viewer: &mut Viewer, painter: &egui::Painter, rect
     let (reference, _) = painted.reference.as_ref()?;
     let (size, rgba) = painted.reference_texture()?;
     let visible = rect.intersect(painter.clip_rect());
-    let is_held = is_asked_for(ui, &viewer.held, visible);
+    let is_held = is_asked_for(ui, &viewer.keyboard, visible);
     let is_wiped = painted.painting.comparison == Comparison::Wipe;
     if !(is_held || is_wiped) || !visible.is_positive() {
         return None;
@@ -261,13 +261,13 @@ pub fn overlay(ui: &egui::Ui, viewer: &mut Viewer, painter: &egui::Painter, rect
 }
 
 /// Whether the reference is to be seen in the place of the picture: Shift, and nothing else.
-fn is_asked_for(ui: &egui::Ui, held: &Held, visible: Rect) -> bool {
+fn is_asked_for(ui: &egui::Ui, keyboard: &Keyboard, visible: Rect) -> bool {
     if ui.ctx().text_edit_focused() {
         return false;
     }
     ui.input(|i| {
         i.modifiers.shift_only()
-            && held.only(&[Key::ShiftLeft, Key::ShiftRight])
+            && keyboard.holds_only(&[Key::ShiftLeft, Key::ShiftRight])
             && !i.pointer.any_down()
             && i.pointer.latest_pos().is_some_and(|p| visible.contains(p))
     })

@@ -48,7 +48,8 @@ impl Kind {
             Self::Error => {
                 "relMSE: noise as estimated from the two halves of the iterations, in which a single bright pixel (a \
                  firefly) counts little and the blur of the radius nothing; against the reference, if there is one, \
-                 where one such pixel may rule, and without the worst thousandth of the pixels (trimmed); and the slopes of the theory (Knaus & Zwicker 2011)"
+                 where one such pixel may rule, and without the worst thousandth of the pixels \
+                 (trimmed); and the slopes of the theory (Knaus & Zwicker 2011)"
             }
             Self::Radius => "median radius of the estimate",
             Self::Rate => "photon paths that leave the lamps, and photons that are stored, a second",
@@ -122,7 +123,6 @@ struct Sample {
     means: Vec<Record>,
     estimated: Vec<Measured>,
     against_reference: Vec<Measured>,
-    trimmed: Vec<Measured>,
 }
 
 impl Sample {
@@ -132,7 +132,6 @@ impl Sample {
             means: history.records.sample(MOST_MEANS),
             estimated: history.estimated.sample(MOST_POINTS),
             against_reference: history.against_reference.sample(MOST_POINTS),
-            trimmed: history.trimmed.sample(MOST_POINTS),
         }
     }
 }
@@ -325,9 +324,10 @@ fn curves(kind: Kind, sample: &Sample, alpha: f64, by_seconds: bool) -> Vec<Curv
                 let name = if by_seconds { "t" } else { "N" };
                 curves.push(Curve { name: format!("{name}^−{exponent:.2}"), points: slope, dashed: true });
             }
-            if !sample.trimmed.is_empty() {
-                let points = sample.trimmed.iter().map(|m| [at(m.iteration, m.seconds), m.rel_mse.log10()]).collect();
-                curves.push(solid("trimmed", points));
+            let trimmed = |m: &Measured| Some([at(m.iteration, m.seconds), m.trimmed?.log10()]);
+            let trimmed: Vec<_> = sample.against_reference.iter().filter_map(trimmed).collect();
+            if !trimmed.is_empty() {
+                curves.push(solid("trimmed", trimmed));
             }
             curves
         }
@@ -436,13 +436,13 @@ mod tests {
             iteration,
             seconds: 0.5 * f64::from(iteration),
             rel_mse: 1.0 / f64::from(iteration),
+            trimmed: None,
         };
         Sample {
             records: [1, 2, 10, 100].map(record).to_vec(),
             means: [1, 2, 10, 100].map(record).to_vec(),
             estimated: [10, 100].map(measured).to_vec(),
             against_reference: vec![],
-            trimmed: vec![],
         }
     }
 

@@ -83,31 +83,38 @@ fn scale_photons(ui: &egui::Ui, viewer: &mut Viewer, factor: f64) {
     });
 }
 
-/// Keys as they lie under the fingers. Of a sign that needs Shift egui never sees the end, if Shift is let go first: the
-/// key has another name then.
+/// What keys did in the frames before.
 #[derive(Default)]
-pub struct Held(BTreeSet<Key>);
+pub struct Keyboard {
+    /// Keys as they lie under the fingers. Of a sign that needs Shift egui never sees the end, if Shift is let go first: the
+    /// key has another name then.
+    held: BTreeSet<Key>,
+    /// Whether a field, a button or the like had the keys in the frame before.
+    had_focus: bool,
+    /// Whether it was left by Escape then.
+    escaped: bool,
+}
 
-impl Held {
+impl Keyboard {
     /// Takes an event in; whether it is more than the repetition of a press.
     fn take(&mut self, event: &egui::Event) -> bool {
         match event {
-            egui::Event::Key { key, physical_key, pressed: true, .. } => self.0.insert(physical_key.unwrap_or(*key)),
+            egui::Event::Key { key, physical_key, pressed: true, .. } => self.held.insert(physical_key.unwrap_or(*key)),
             egui::Event::Key { key, physical_key, pressed: false, .. } => {
-                self.0.remove(&physical_key.unwrap_or(*key));
+                self.held.remove(&physical_key.unwrap_or(*key));
                 true
             }
             egui::Event::WindowFocused(false) => {
-                self.0.clear();
+                self.held.clear();
                 true
             }
             _ => true,
         }
     }
 
-    /// Whether nothing is but these.
-    pub fn only(&self, keys: &[Key]) -> bool {
-        self.0.iter().all(|key| keys.contains(key))
+    /// Whether no key is held but these.
+    pub fn holds_only(&self, keys: &[Key]) -> bool {
+        self.held.iter().all(|key| keys.contains(key))
     }
 }
 
@@ -116,10 +123,10 @@ pub fn handle(ui: &mut egui::Ui, viewer: &mut Viewer) {
     let typing = ui.ctx().text_edit_focused();
     // What has the focus, a field or a menu does with Escape comes first. egui has taken the focus by now.
     let has_focus = ui.ctx().egui_wants_keyboard_input();
-    let had_focus = std::mem::replace(&mut viewer.had_focus, has_focus);
+    let had_focus = std::mem::replace(&mut viewer.keyboard.had_focus, has_focus);
     let escaped = had_focus && !has_focus && ui.input(|i| i.key_pressed(Key::Escape));
     // In the next frame, too: there a number field of egui 0.37 still counts as just left, and would take what was typed.
-    let escaped_before = std::mem::replace(&mut viewer.escaped, escaped);
+    let escaped_before = std::mem::replace(&mut viewer.keyboard.escaped, escaped);
     let escapes = !had_focus && !escaped_before && !egui::Popup::is_any_open(ui.ctx());
     let modified = |event: &egui::Event| match event {
         egui::Event::Key { key, pressed: true, modifiers, .. } if modifiers.command || modifiers.alt => Some(*key),
@@ -129,9 +136,9 @@ pub fn handle(ui: &mut egui::Ui, viewer: &mut Viewer) {
         ui.input(|i| viewer.picture.not_flying.extend(i.events.iter().filter_map(modified)));
     }
     // In a field, and with Ctrl, undo among it, a held key does again what it does.
-    let again =
+    let repeats =
         |event: &egui::Event| typing || matches!(event, egui::Event::Key { modifiers, .. } if modifiers.command);
-    ui.input_mut(|i| i.events.retain(|event| viewer.held.take(event) || again(event)));
+    ui.input_mut(|i| i.events.retain(|event| viewer.keyboard.take(event) || repeats(event)));
     if escaped_before {
         let (key, modifiers) = (Key::Escape, Modifiers::NONE);
         let again = egui::Event::Key { key, physical_key: None, pressed: true, repeat: true, modifiers };

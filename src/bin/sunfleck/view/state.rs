@@ -66,8 +66,7 @@ impl Edits {
     }
 
     /// Changes the settings, and those of every step.
-    pub fn map(&mut self, change: impl FnMut(&Settings) -> Settings) {
-        let mut change = change;
+    pub fn map(&mut self, change: impl Fn(&Settings) -> Settings) {
         let all = self.undo.iter_mut().chain(&mut self.redo).chain([&mut self.now]);
         all.for_each(|settings| *settings = Arc::new(change(settings)));
     }

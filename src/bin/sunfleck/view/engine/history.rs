@@ -27,6 +27,9 @@ pub struct Measured {
     /// Since the restart, pauses left out.
     pub seconds: f64,
     pub rel_mse: f64,
+    /// Of an error against a reference, the same without the thousandth of the pixels that is worst: single bright ones
+    /// rule the mean.
+    pub trimmed: Option<f64>,
 }
 
 /// What belongs to an iteration.
@@ -115,8 +118,6 @@ pub struct History {
     pub estimated: Series<Measured>,
     /// Against the reference.
     pub against_reference: Series<Measured>,
-    /// The same without the thousandth of the pixels that is worst: single bright ones rule the mean.
-    pub trimmed: Series<Measured>,
 }
 
 #[cfg(test)]
@@ -126,7 +127,7 @@ mod tests {
     fn of(iterations: impl Iterator<Item = u32>) -> Series<Measured> {
         let mut series = Series::default();
         for iteration in iterations {
-            series.push(Measured { iteration, seconds: 0.0, rel_mse: 1.0 });
+            series.push(Measured { iteration, seconds: 0.0, rel_mse: 1.0, trimmed: None });
         }
         series
     }

@@ -349,7 +349,6 @@ impl Engine {
     pub fn set_reference(&self, reference: Option<Arc<Reference>>) {
         let mut board = self.shared.board();
         board.history.against_reference.clear();
-        board.history.trimmed.clear();
         board.reference = reference;
         self.shared.changed.notify_all();
     }
@@ -360,7 +359,6 @@ impl Engine {
         move |reference| {
             shared.update(|board| {
                 board.history.against_reference.clear();
-                board.history.trimmed.clear();
                 board.reference = Some(Arc::new(reference));
             });
         }

@@ -82,7 +82,7 @@ impl Task {
 
 /// Shows what was painted, and notes the errors of its film: estimated, and against the reference.
 fn publish(board: &mut Board, task: &Task, painted: Arc<Painted>, estimated: Option<f64>) {
-    let measured = painted.figures.map(|figures| [figures.rel_mse, figures.rel_mse_trimmed]);
+    let figures = painted.figures;
     let frame = &task.frame;
     if board.frame.is_some() {
         board.painted = Some(painted);
@@ -91,14 +91,13 @@ fn publish(board: &mut Board, task: &Task, painted: Arc<Painted>, estimated: Opt
         return;
     }
     let (iteration, seconds) = (frame.film.n_iterations, frame.seconds);
-    let point = |rel_mse| Measured { iteration, seconds, rel_mse };
+    let point = |rel_mse, trimmed| Measured { iteration, seconds, rel_mse, trimmed };
     if let Some(rel_mse) = estimated {
-        board.history.estimated.push(point(rel_mse));
+        board.history.estimated.push(point(rel_mse, None));
     }
     // Another reference may have been set in the meantime.
-    if let Some([all, trimmed]) = measured.filter(|_| is_same(task.reference.as_ref(), board.reference.as_ref())) {
-        board.history.against_reference.push(point(all));
-        board.history.trimmed.push(point(trimmed));
+    if let Some(figures) = figures.filter(|_| is_same(task.reference.as_ref(), board.reference.as_ref())) {
+        board.history.against_reference.push(point(figures.rel_mse, Some(figures.rel_mse_trimmed)));
     }
 }
 
