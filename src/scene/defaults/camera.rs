@@ -1,5 +1,6 @@
 //! Where to look at a scene from that does not say.
 
+use super::inside::Room;
 use super::view::Lamps;
 use crate::scene::{Camera, Scene, Sphere};
 use glam::Vec3;
@@ -26,7 +27,8 @@ const VIEWS_AT_ONCE: usize = 5;
 /// there is something else.
 ///
 /// Where clearly more of what is seen faces a lamp from another side, as before a room of which a wall is left out, it stands
-/// there; so that z is up if the lamps of that room say so.
+/// there; so that z is up if the lamps of that room say so. Where nothing lit is seen from any side, as around a closed room,
+/// it stands inside, if there is something to be seen.
 pub fn default_camera(scene: &Scene, more: &[Sphere]) -> Camera {
     let outside = bounding_sphere(scene, more, false);
     let with_inward = outside.is_none();
@@ -37,11 +39,11 @@ pub fn default_camera(scene: &Scene, more: &[Sphere]) -> Camera {
         view.framing(points, centre, radius)
     };
     let usual = framed(View::y_up(USUAL));
-    let Some(lamps) = Lamps::of(scene) else { return usual };
+    let Some(lamps) = Lamps::of(scene, radius) else { return usual };
     let [n_lit, n_usual] = lamps.lit_and_seen(scene, &usual);
     let share = |[n_lit, n_seen]: [usize; 2]| n_lit as f32 / n_seen.max(n_usual).max(1) as f32;
     let mut best = (share([n_lit, n_usual]), usual);
-    let is_z_up = lamps.lean(centre, radius) > LEAN * radius;
+    let is_z_up = lamps.lean(centre) > LEAN * radius;
     for views in View::others(is_z_up).chunks(VIEWS_AT_ONCE) {
         // No other can be clearly better.
         if CLEARLY_MORE * best.0 >= 1.0 {
@@ -59,7 +61,13 @@ pub fn default_camera(scene: &Scene, more: &[Sphere]) -> Camera {
             false => best,
         });
     }
-    best.1
+    let inside = || {
+        let room = Room::new(scene, &lamps)?;
+        let up = if is_z_up { Vec3::Z } else { Vec3::Y };
+        let [low, high] = bounding_box(scene, more, with_inward)?;
+        if room.is_dark(&best.1, LEAST_SHARE) { room.camera_inside([low, high], up) } else { None }
+    };
+    inside().unwrap_or(best.1)
 }
 
 /// A direction to look from.
@@ -235,10 +243,7 @@ mod tests {
     fn a_wall_is_looked_at_from_its_lit_side() {
         let mut scene = room(Vec3::Z, Vec3::Y);
         scene.meshes[0] = Mesh::default();
-        add_quad(
-            &mut scene.meshes[0],
-            [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| Vec3::new(x, y, 1.0)),
-        );
+        add_quad(&mut scene.meshes[0], SQUARE.map(|[x, y]| Vec3::new(x, y, 1.0)));
         let [towards, up] = stands(&default_camera(&scene, &[]));
         assert!(towards.z < -0.8 && up.y > 0.9, "{towards} {up}");
     }
@@ -269,15 +274,42 @@ mod tests {
         scene.meshes.truncate(1);
         scene.lights = vec![sun(Vec3::new(-0.5, -1.0, -0.5))];
         same(&scene);
-        // Nowhere is more light to be seen, or but a speck.
-        let mut closed = room(Vec3::Z, Vec3::Y);
-        add_quad(
-            &mut closed.meshes[0],
-            [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| Vec3::new(x, y, 1.0)),
-        );
-        same(&closed);
-        let knob = [[-0.02, -0.02], [0.02, -0.02], [0.02, 0.02], [-0.02, 0.02]].map(|[x, y]| Vec3::new(-x, y, -1.01));
-        add_quad(&mut closed.meshes[1], knob);
-        same(&closed);
+        // The lamp of a closed room is covered: there is nothing to be seen inside.
+        let mut covered = closed_room(Vec3::Y);
+        add_quad(&mut covered.meshes[0], SQUARE.map(|[x, z]| Vec3::new(x, 0.9, z)));
+        same(&covered);
+        // A lamp that is off lights nothing.
+        covered.meshes.truncate(1);
+        covered.lights = vec![PunctualLight { intensity: Vec3::ZERO, kind: PunctualKind::Point, ..sun(Vec3::Y) }];
+        same(&covered);
+    }
+
+    const SQUARE: [[f32; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+
+    fn closed_room(up: Vec3) -> Scene {
+        let mut scene = room(Vec3::X, up);
+        add_quad(&mut scene.meshes[0], SQUARE.map(|[y, z]| Vec3::new(1.0, y, z)));
+        scene
+    }
+
+    /// Also if a speck shines outside, and beside a dark one that the lamp would light without the wall between.
+    #[test]
+    fn a_closed_room_is_looked_at_from_inside() {
+        for up in [Vec3::Y, Vec3::Z] {
+            let room = closed_room(up);
+            let mut with_speck = room.clone();
+            let speck = SQUARE.map(|[y, z]| Vec3::new(-1.01, -0.02 * y, 0.02 * z));
+            add_quad(&mut with_speck.meshes[1], speck);
+            let mut beside_dark = room.clone();
+            let mut dark = room.meshes[0].clone();
+            dark.positions.iter_mut().for_each(|p| p.x += 2.5);
+            beside_dark.meshes.push(dark);
+            for scene in [room, with_speck, beside_dark] {
+                let camera = default_camera(&scene, &[]);
+                let at = Vec3::from(camera.world_from_camera.translation);
+                assert!(at.abs().max_element() < 1.0 && camera.focus_distance > 0.5, "{up}: {camera:?}");
+                assert!(stands(&camera)[1].dot(up) > 0.9, "{up}: {camera:?}");
+            }
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! A light and a camera for scenes that bring none.
 
 mod camera;
+mod inside;
 mod view;
 
 pub use camera::default_camera;

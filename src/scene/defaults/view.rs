@@ -10,7 +10,11 @@ const SIDE: usize = 48;
 const MOST_LAMPS: usize = 64;
 
 /// Where light comes from.
-pub struct Lamps(Vec<Lamp>);
+pub struct Lamps {
+    lamps: Vec<Lamp>,
+    /// Radius of the scene, metres: as far away are those that are endlessly far.
+    pub reach: f32,
+}
 
 enum Lamp {
     /// All round.
@@ -22,6 +26,14 @@ enum Lamp {
 }
 
 impl Lamp {
+    /// From `p` to it.
+    fn offset_from(&self, p: Vec3, reach: f32) -> Vec3 {
+        match *self {
+            Self::Point(position) | Self::OneSided(position, _) => position - p,
+            Self::Directional(direction) => -direction * reach,
+        }
+    }
+
     /// Whether it is in front of the surface at `p`, and that in front of it.
     fn faces(&self, p: Vec3, normal: Vec3) -> bool {
         match *self {
@@ -33,13 +45,13 @@ impl Lamp {
 }
 
 impl Lamps {
-    /// Those of a scene; none if there are none, or the light comes from everywhere.
-    pub fn of(scene: &Scene) -> Option<Self> {
+    /// Those that are on in a scene of radius `reach`, metres; none if there are none, or the light comes from everywhere.
+    pub fn of(scene: &Scene, reach: f32) -> Option<Self> {
         if scene.environment.is_some() {
             return None;
         }
         let mut lamps = Vec::new();
-        for light in &scene.lights {
+        for light in scene.lights.iter().filter(|light| light.intensity != Vec3::ZERO) {
             lamps.push(match light.kind {
                 PunctualKind::Point => Lamp::Point(light.position),
                 PunctualKind::Spot { .. } => Lamp::OneSided(light.position, light.direction),
@@ -57,7 +69,7 @@ impl Lamps {
                 false => Lamp::OneSided(middle, (b - a).cross(c - a)),
             });
         }
-        (!lamps.is_empty()).then_some(Self(lamps))
+        (!lamps.is_empty()).then_some(Self { lamps, reach })
     }
 
     /// Of the pixels of a picture with triangles in them, how many show what shines, lets light through or faces a lamp; and
@@ -65,33 +77,41 @@ impl Lamps {
     pub fn lit_and_seen(&self, scene: &Scene, camera: &Camera) -> [usize; 2] {
         let seen = seen(scene, camera);
         let eye = Vec3::from(camera.world_from_camera.translation);
-        [seen.iter().filter(|seen| self.light(seen, eye)).count(), seen.len()]
+        [seen.iter().filter(|seen| self.light(seen, eye, |_| true)).count(), seen.len()]
     }
 
-    /// How much farther towards z than towards y the lamps of a scene of this place and size lie, on average, metres.
-    pub fn lean(&self, centre: Vec3, radius: f32) -> f32 {
-        let offsets = self.0.iter().map(|lamp| match *lamp {
-            Lamp::Point(position) | Lamp::OneSided(position, _) => position - centre,
-            Lamp::Directional(direction) => -direction * radius,
-        });
-        let sum: Vec3 = offsets.sum();
-        (sum.z - sum.y) / self.0.len() as f32
+    /// How much farther towards z than towards y the lamps of a scene around `centre` lie, on average, metres.
+    pub fn lean(&self, centre: Vec3) -> f32 {
+        let sum: Vec3 = self.lamps.iter().map(|lamp| lamp.offset_from(centre, self.reach)).sum();
+        (sum.z - sum.y) / self.lamps.len() as f32
     }
 
-    fn light(&self, seen: &Seen, eye: Vec3) -> bool {
+    /// Whether what is seen from `eye` shines, lets light through, or faces a lamp of which `is_clear` says, given how far
+    /// it is from there, that nothing is between.
+    pub fn light(&self, seen: &Seen, eye: Vec3, is_clear: impl Fn(Vec3) -> bool) -> bool {
         let Seen { p, normal, material } = *seen;
-        let lets_through = material.transmission > 0.0 || material.alpha == AlphaMode::Blend;
         let normal = if normal.dot(eye - p) < 0.0 { -normal } else { normal };
-        is_lamp(material) || lets_through || self.0.iter().any(|lamp| lamp.faces(p, normal))
+        let shines = |lamp: &Lamp| lamp.faces(p, normal) && is_clear(lamp.offset_from(p, self.reach));
+        is_lamp(material) || lets_through(material) || self.lamps.iter().any(shines)
     }
 }
 
+/// Whether light goes on behind a surface, some of it at least.
+pub fn lets_through(material: &Material) -> bool {
+    material.transmission > 0.0 || material.alpha == AlphaMode::Blend
+}
+
+/// Whether a triangle of this normal is not seen by one who looks along `direction`: it has one side only.
+pub fn hides_from(material: &Material, normal: Vec3, direction: Vec3) -> bool {
+    !material.double_sided && material.transmission == 0.0 && normal.dot(direction) >= 0.0
+}
+
 /// What is nearest in a pixel.
-struct Seen<'a> {
-    p: Vec3,
+pub struct Seen<'a> {
+    pub p: Vec3,
     /// Of any length.
-    normal: Vec3,
-    material: &'a Material,
+    pub normal: Vec3,
+    pub material: &'a Material,
 }
 
 /// What is nearest in every pixel where there is something.
@@ -108,7 +128,7 @@ fn seen<'a>(scene: &'a Scene, camera: &Camera) -> Vec<Seen<'a>> {
         for &triangle in &mesh.triangles {
             let Some([a, b, c]) = corners(&mesh.positions, triangle) else { continue };
             let normal = (b - a).cross(c - a);
-            if !material.double_sided && material.transmission == 0.0 && normal.dot(eye - a) <= 0.0 {
+            if hides_from(material, normal, a - eye) {
                 continue;
             }
             let places = [a, b, c].map(|p| {
