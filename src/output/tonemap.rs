@@ -75,24 +75,31 @@ pub fn srgb_encode(linear: f32) -> f32 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// Automatic exposure, stops: brings the picture's log-average luminance to mid grey, 0.18 (Reinhard et al. 2002).
+/// Automatic exposure, stops: brings the picture's log-average luminance to the key 0.18·4^f, with f in [−1, 1] by where
+/// the average lies between the darkest and the brightest: mid grey half-way, darker where most is dark, brighter where most
+/// is bright (Reinhard 2002, "Parameter estimation for photographic tone reproduction"). So a dim background does not burn
+/// out what stands before it.
 ///
-/// The average is over lit pixels, those brighter than 2⁻¹² of the 98th percentile of what is above 0, with everything
-/// above that percentile cut off there: neither a black background nor a few fireflies nor a lamp in view move it. A
-/// black picture gets 0.
+/// All are of lit pixels, those brighter than 2⁻¹² of the 98th percentile of what is above 0, with everything above that
+/// percentile, and below the 2nd, cut off there: neither a black background nor a few fireflies nor a lamp in view move it.
+/// A black picture gets 0.
 pub fn automatic_exposure(rgb: &[[f32; 3]]) -> f32 {
+    let percentile = |values: &mut [f32], n: usize| {
+        let at = (values.len() - 1) * n / 100;
+        *values.select_nth_unstable_by(at, f32::total_cmp).1
+    };
     let mut lit: Vec<f32> = rgb.iter().map(|&c| luminance(c)).filter(|y| *y > 0.0 && y.is_finite()).collect();
     if lit.is_empty() {
         return 0.0;
     }
-    let at = (lit.len() - 1) * 98 / 100;
-    let bright = *lit.select_nth_unstable_by(at, f32::total_cmp).1;
-    let (mut sum, mut n) = (0.0, 0u32);
-    for y in lit.into_iter().filter(|&y| y > bright / 4096.0) {
-        sum += f64::from(y.min(bright)).log2();
-        n += 1;
-    }
-    (0.18f64.log2() - sum / f64::from(n)).clamp(-60.0, 60.0) as f32
+    let bright = percentile(&mut lit, 98);
+    lit.retain(|&y| y > bright / 4096.0);
+    let dark = percentile(&mut lit, 2);
+    let stops = |y: f32| f64::from(y.clamp(dark, bright)).log2();
+    let mean = lit.iter().map(|&y| stops(y)).sum::<f64>() / lit.len() as f64;
+    let [low, high] = [stops(dark), stops(bright)];
+    let f = if high > low { (2.0 * mean - low - high) / (high - low) } else { 0.0 };
+    (0.18f64.log2() + 2.0 * f - mean).clamp(-60.0, 60.0) as f32
 }
 
 #[cfg(test)]
@@ -166,6 +173,10 @@ mod tests {
         noisy.extend([[1e-6; 3]; 1000]);
         noisy.extend([[1e6; 3], [f32::INFINITY; 3], [f32::NAN; 3]]);
         assert!((automatic_exposure(&noisy) + 1.0).abs() < 1e-2, "{}", automatic_exposure(&noisy));
+        // A dim background three stops below the subject: the mean is a sixteenth of the way up, f = −7/8.
+        let mut subject = vec![[0.125; 3]; 15 * 64];
+        subject.extend([[1.0; 3]; 64]);
+        assert!((automatic_exposure(&subject) - (0.18f32.log2() - 1.75 + 3.0 * 15.0 / 16.0)).abs() < 1e-5);
         assert_eq!(automatic_exposure(&[]), 0.0);
         assert_eq!(automatic_exposure(&[[0.0; 3]; 4]), 0.0);
     }

@@ -107,7 +107,7 @@ pub struct RenderArgs {
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
     pub output: Vec<PathBuf>,
 
-    /// Stops by which a .png is brightened [default: automatic, log-average to mid grey]
+    /// Stops by which a .png is brightened [default: automatic, from the log-average]
     #[arg(long, value_name = "STOPS", allow_hyphen_values = true, value_parser = exposure, help_heading = "Output")]
     pub exposure: Option<f32>,
 
