@@ -1,7 +1,9 @@
-//! What readers of files have in common. Shared by the tasks on points and on meshes.
+//! What readers of files have in common. Shared by the tasks on points and on meshes, by scenes and by pictures.
 //!
 //! A file is data from a stranger: what its header promises is compared with its size before anything is allocated for.
 
+#[cfg(feature = "render")]
+pub mod exr;
 mod lines;
 pub mod ply;
 

@@ -11,7 +11,7 @@ const ALLOWED: [(&str, &[&str]); 13] = [
     ("points", &["files", "index", "math"]),
     ("mesh", &["files", "index", "math", "points"]),
     ("layout", &["index", "math"]),
-    ("scene", &["mesh", "layout", "index", "math"]),
+    ("scene", &["files", "mesh", "layout", "index", "math"]),
     ("ppm", &["scene", "layout", "device", "index", "math"]),
     ("cpu", &["ppm", "scene", "layout", "device", "index", "math"]),
     ("gpu", &["ppm", "scene", "layout", "device", "index", "math"]),

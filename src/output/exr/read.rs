@@ -1,26 +1,17 @@
-//! Pictures of any program: which of a file's channels are the picture, and which of its pixels.
+//! Pictures of any program: which of a file's pixels are the picture.
 
-use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-use ::exr::error::Error as Problem;
-use ::exr::image::read::specific_channels::ReadSpecificChannel;
-use ::exr::meta::MetaData;
-use ::exr::meta::attribute::Text;
 use ::exr::meta::header::Header;
-use ::exr::prelude::{ReadChannels, ReadLayers, Vec2};
 
-use crate::files::shorten;
+use crate::files::exr::{Image, Limits, MAGIC};
 use crate::output::{Error, Picture};
 
 /// Largest picture that [`read`] takes, pixels: 3 GiB of linear RGB.
 pub const MAX_READ_PIXELS: u64 = 1 << 28;
-/// A block, all channels of some rows or of a tile, is decoded as a whole, one on each thread.
-const MAX_BLOCK_BYTES: usize = 1 << 30;
-/// Every OpenEXR file begins with these.
-const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+const LIMITS: Limits = Limits { size: check_size, block_bytes: 1 << 30 };
 
 /// Reads a picture in full size, whoever wrote it, as far as it is in the display window. Not from a file with deep data,
 /// in whichever part.
@@ -29,163 +20,50 @@ const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 /// `Combined.R`, in either case, or `Y` as grey; of several layers, the one whose name ends in "Combined" or "beauty",
 /// which renderers call the sum of their passes.
 pub fn read(path: &Path) -> Result<Picture, Error> {
-    let fail = |reason: &dyn std::fmt::Display| Error::read(path, reason);
-    let meta = meta(path)?;
-    let (header, channels) = choose(&meta.headers).map_err(|e| fail(&e))?;
+    let image = open(path)?;
+    let header = image.header();
     let [x, y, right, bottom] = window(header);
     let display = header.shared_attributes.display_window;
     // Counted from the corner of the display window.
     let columns = Visible::new(x - i64::from(display.position.0), header.layer_size.0, display.size.0);
     let rows = Visible::new(y - i64::from(display.position.1), header.layer_size.1, display.size.1);
     let (Some(columns), Some(rows)) = (columns, rows) else {
-        return Err(fail(&format_args!(
+        let problem = format!(
             "its data window, ({x}, {y}) to ({right}, {bottom}), is outside of its display window, {}x{} from ({}, {})",
             display.size.0, display.size.1, display.position.0, display.position.1
-        )));
+        );
+        return Err(Error::read(path, problem));
     };
 
-    let new = || Plane::new(columns, rows);
-    let file = BufReader::new(File::open(path).map_err(|e| fail(&e))?);
-    let wanted = ::exr::prelude::read().no_deep_data().largest_resolution_level().specific_channels();
-    let plane = match channels {
-        Channels::Rgb([r, g, b]) => wanted
-            .required(r)
-            .required(g)
-            .required(b)
-            .collect_pixels(|_, _| new(), |plane: &mut Plane, at, (r, g, b): (f32, f32, f32)| plane.set(at, [r, g, b]))
-            .first_valid_layer()
-            .all_attributes()
-            .from_buffered(file)
-            .map(|image| image.layer_data.channel_data.pixels),
-        Channels::Grey(y) => wanted
-            .required(y)
-            .collect_pixels(|_, _| new(), |plane: &mut Plane, at, (y,): (f32,)| plane.set(at, [y; 3]))
-            .first_valid_layer()
-            .all_attributes()
-            .from_buffered(file)
-            .map(|image| image.layer_data.channel_data.pixels),
-    };
-    let rgb = plane.map_err(|e| fail(&e))?.rgb;
+    let mut plane = Plane::new(columns, rows);
+    image.decode(|at, rgb| plane.set(at, rgb)).map_err(|e| Error::read(path, e))?;
     let size = [display.size.0 as u32, display.size.1 as u32];
-    Ok(Picture { size, crop: [columns.from, rows.from, columns.to, rows.to], rgb, variance: None })
+    Ok(Picture { size, crop: [columns.from, rows.from, columns.to, rows.to], rgb: plane.rgb, variance: None })
 }
 
 /// What part of the plane the file has the picture in, in its own coordinates, whether displayed or not: x0, y0, x1, y1
 /// (exclusive).
 pub fn data_window(path: &Path) -> Result<[i64; 4], Error> {
-    let meta = meta(path)?;
-    let (header, _) = choose(&meta.headers).map_err(|e| Error::read(path, e))?;
-    Ok(window(header))
+    Ok(window(open(path)?.header()))
 }
 
-/// All headers, none of which asks for too much memory.
-fn meta(path: &Path) -> Result<MetaData, Error> {
+fn open(path: &Path) -> Result<Image<BufReader<File>>, Error> {
     let fail = |reason: &dyn std::fmt::Display| Error::read(path, reason);
-    let kind = std::fs::metadata(path).map_err(|e| fail(&e))?;
-    if !kind.is_file() {
+    // Before it is opened: opening a pipe would wait for a writer.
+    if !std::fs::metadata(path).map_err(|e| fail(&e))?.is_file() {
         return Err(fail(&"not a regular file"));
     }
-    let mut begin = [0; 4];
-    if File::open(path).and_then(|mut file| file.read_exact(&mut begin)).is_ok() && begin != MAGIC {
+    let mut file = BufReader::new(File::open(path).map_err(|e| fail(&e))?);
+    let mut begin = [0; MAGIC.len()];
+    if file.read_exact(&mut begin).is_ok() && begin != MAGIC {
         return Err(fail(&"not an OpenEXR file"));
     }
-    let meta = MetaData::read_from_file(path, false).map_err(|e: Problem| fail(&e))?;
-    for header in &meta.headers {
-        let pixels = header.layer_size.0 as u64 * header.layer_size.1 as u64;
-        if pixels > MAX_READ_PIXELS {
-            return Err(fail(&format_args!("{pixels} pixels, more than {MAX_READ_PIXELS}")));
-        }
-        let block = header.max_block_pixel_size();
-        let bytes = block.0.checked_mul(block.1).and_then(|n| n.checked_mul(header.channels.bytes_per_pixel));
-        if bytes.is_none_or(|n| n > MAX_BLOCK_BYTES) || header.chunk_count as u64 > kind.len() {
-            return Err(fail(&"its blocks are too large, or more than it can have"));
-        }
-    }
-    Ok(meta)
+    Image::open(file, &LIMITS).map_err(|e| fail(&e))
 }
 
-/// What a picture is made of.
-#[derive(Debug)]
-enum Channels {
-    Rgb([Text; 3]),
-    Grey(Text),
-}
-
-/// The part and its channels that are the picture: always the first part that has these channels.
-fn choose(headers: &[Header]) -> Result<(&Header, Channels), String> {
-    let parts = || headers.iter();
-    let find = |header: &Header, name: &str| {
-        let is_named = |c: &&Text| c.as_slice().eq_ignore_ascii_case(name.as_bytes());
-        header.channels.list.iter().map(|c| &c.name).find(is_named).cloned()
-    };
-    let plain = ["R", "G", "B"];
-    let has = |header: &Header, name: &str| header.channels.list.iter().any(|c| c.name == *name);
-    if let Some(header) = parts().find(|header| plain.iter().all(|name| has(header, name))) {
-        return Ok((header, Channels::Rgb(plain.map(Text::from))));
-    }
-
-    let mut layers: BTreeMap<String, (&Header, Channels)> = BTreeMap::new();
-    for header in parts() {
-        for (name, channels) in triples(header) {
-            layers.entry(name).or_insert((header, Channels::Rgb(channels)));
-        }
-    }
-    if let Some(found) = layers.remove("") {
-        return Ok(found);
-    }
-    // With chroma it is not grey, and with X no luminance.
-    let is_grey = |header: &&Header| ["X", "RY", "BY"].iter().all(|name| find(header, name).is_none());
-    let luminance = parts().find_map(|header| Some((header, find(header, "Y")?)));
-    if let Some((header, y)) = luminance.filter(|(header, _)| is_grey(header)) {
-        layers.entry("Y".into()).or_insert((header, Channels::Grey(y)));
-    }
-    if layers.len() > 1 {
-        let is_sum = |name: &String| ["combined", "beauty"].iter().any(|end| name.to_lowercase().ends_with(end));
-        let names: Vec<String> = layers.keys().cloned().collect();
-        layers.retain(|name, _| is_sum(name));
-        if layers.len() != 1 {
-            let names = listed(names.iter().map(String::as_str));
-            return Err(format!(
-                "several layers could be the picture, and no single one is called Combined or beauty: {names}"
-            ));
-        }
-    }
-    layers.into_values().next().ok_or_else(|| {
-        let names: Vec<_> =
-            parts().flat_map(|header| &header.channels.list).map(|c| lossy(c.name.as_slice())).collect();
-        format!("it has no channels R, G and B, plain or of a layer, but {}", listed(names.iter().map(String::as_str)))
-    })
-}
-
-/// The layers of a part that have red, green and blue.
-fn triples(header: &Header) -> impl Iterator<Item = (String, [Text; 3])> {
-    let mut layers: BTreeMap<&[u8], [Option<&Text>; 3]> = BTreeMap::new();
-    for name in header.channels.list.iter().map(|c| &c.name) {
-        let (layer, channel) = match name.as_slice().iter().rposition(|&byte| byte == b'.') {
-            Some(dot) => (&name.as_slice()[..dot], &name.as_slice()[dot + 1..]),
-            None => (&[][..], name.as_slice()),
-        };
-        if let Some(i) = ["R", "G", "B"].iter().position(|c| channel.eq_ignore_ascii_case(c.as_bytes())) {
-            layers.entry(layer).or_default()[i].get_or_insert(name);
-        }
-    }
-    layers.into_iter().filter_map(|(layer, [r, g, b])| Some((lossy(layer), [r?.clone(), g?.clone(), b?.clone()])))
-}
-
-fn lossy(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-/// For a message of one line.
-fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
-    const MOST: usize = 24;
-    let mut names: Vec<_> = names.map(shorten).collect();
-    if names.len() > MOST {
-        let more = names.len() - MOST;
-        names.truncate(MOST);
-        names.push(format!("{more} more"));
-    }
-    names.join(", ")
+fn check_size(width: usize, height: usize) -> Result<(), String> {
+    let pixels = width as u64 * height as u64;
+    if pixels > MAX_READ_PIXELS { Err(format!("{pixels} pixels, more than {MAX_READ_PIXELS}")) } else { Ok(()) }
 }
 
 /// The data window: x0, y0, x1, y1 (exclusive).
@@ -234,8 +112,8 @@ impl Plane {
         Self { columns, rows, rgb: vec![[0.0; 3]; columns.len() * rows.len()] }
     }
 
-    fn set(&mut self, at: Vec2<usize>, rgb: [f32; 3]) {
-        if let (Some(x), Some(y)) = (self.columns.place(at.0), self.rows.place(at.1)) {
+    fn set(&mut self, [x, y]: [usize; 2], rgb: [f32; 3]) {
+        if let (Some(x), Some(y)) = (self.columns.place(x), self.rows.place(y)) {
             self.rgb[y * self.columns.len() + x] = rgb;
         }
     }
@@ -396,6 +274,26 @@ mod tests {
         assert!(read(&path).unwrap_err().to_string().starts_with("cannot read "));
         std::fs::write(&path, "not an image").unwrap();
         assert!(read(&path).is_err());
+    }
+
+    #[test]
+    fn damaged_pictures_do_not_panic() {
+        let window = bounds(0, 0, 16, 16);
+        for channels in [&["R", "G", "B"][..], &["Combined.R", "Combined.G", "Combined.B"], &["Y"]] {
+            let file = saved(window, [part("main", window, channels)]);
+            let original = std::fs::read(file.path()).unwrap();
+            for i in (0..original.len()).step_by(5) {
+                let mut bytes = original.clone();
+                bytes[i] ^= 0x55;
+                std::fs::write(file.path(), bytes).unwrap();
+                match read(file.path()) {
+                    Ok(picture) => assert_eq!(picture.rgb.len(), picture.crop_size()[0] * picture.crop_size()[1]),
+                    Err(e) => {
+                        assert!(e.to_string().starts_with("cannot read ") && e.to_string().contains(".exr: "), "{e}")
+                    }
+                }
+            }
+        }
     }
 
     /// A header is a few bytes, and can ask for any amount.

@@ -1,13 +1,12 @@
 //! Environment maps: Radiance `.hdr` and OpenEXR, latitude-longitude.
 
 use super::{LoadError, files};
+use crate::files::exr;
 use crate::scene::Environment;
-use exr::prelude::{MetaData, ReadChannels, ReadLayers};
 use glam::Vec3;
 use image::{ImageFormat, ImageReader, Limits};
 use std::f64::consts::PI;
 use std::io::Cursor;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 /// Texels kept, at most: what a renderer can tell apart, and a table to sample from that stays small.
@@ -20,12 +19,15 @@ const MAX_SIDE: usize = 32_768;
 const MAX_FILE_TEXELS: usize = 1 << 28;
 /// Bytes of decoded Radiance data, at most.
 const MAX_HDR_BYTES: u64 = 2 << 30;
-/// Bytes of one decoded block of an OpenEXR file, at most.
+/// Bytes of the blocks of an OpenEXR file that are decoded at once, at most.
 const MAX_BLOCK_BYTES: usize = 256 << 20;
 /// Brighter texels are taken as this bright, so that sums stay finite.
 const MAX_RADIANCE: f32 = 1e20;
 
 /// Reads a `.hdr` or `.exr` file, told apart by content; with it come warnings for the user.
+///
+/// An `.exr` has `R`, `G` and `B`, plain or of a layer, as in `Combined.R`, or `Y` as grey. Its map is the data window, in
+/// whatever display window.
 ///
 /// Larger maps are averaged down to 2048 × 1024, weighted by solid angle, so that the light they bring stays the same.
 pub fn load_environment(path: &Path) -> Result<(Environment, Vec<String>), LoadError> {
@@ -34,10 +36,8 @@ pub fn load_environment(path: &Path) -> Result<(Environment, Vec<String>), LoadE
     let format = |problem: String| LoadError::Format { file: path.into(), problem };
     let map = if bytes.starts_with(b"#?") {
         read_hdr(&bytes).map_err(format)?
-    } else if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
-        // Last resort: the decoder asserts what a file says about its blocks, and a panic must not end the program.
-        let result = catch_unwind(AssertUnwindSafe(|| read_exr(&bytes)));
-        result.unwrap_or_else(|_| Err("the OpenEXR data are damaged".into())).map_err(format)?
+    } else if bytes.starts_with(&exr::MAGIC) {
+        read_exr(&bytes).map_err(format)?
     } else {
         return Err(format("is neither Radiance (.hdr) nor OpenEXR (.exr)".into()));
     };
@@ -73,33 +73,12 @@ fn read_hdr(bytes: &[u8]) -> Result<Downsampled, String> {
 }
 
 fn read_exr(bytes: &[u8]) -> Result<Downsampled, String> {
-    let metadata = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| e.to_string())?;
-    // The decoder allocates what the header says.
-    for header in &metadata.headers {
-        check_size(header.layer_size.0, header.layer_size.1)?;
-        let block = header.max_block_pixel_size();
-        let block_bytes = block.0.checked_mul(block.1).and_then(|n| n.checked_mul(header.channels.bytes_per_pixel));
-        if block_bytes.is_none_or(|n| n > MAX_BLOCK_BYTES) || header.chunk_count > bytes.len() {
-            return Err("the blocks of the OpenEXR file are too large".into());
-        }
-    }
-    let create = |size: exr::math::Vec2<usize>, _: &_| Downsampled::new(size.0, size.1);
-    let set =
-        |map: &mut Result<Downsampled, String>, at: exr::math::Vec2<usize>, (r, g, b, _): (f32, f32, f32, f32)| {
-            if let Ok(map) = map {
-                map.add(at.0, at.1, [r, g, b]);
-            }
-        };
-    let image = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .rgba_channels(create, set)
-        .first_valid_layer()
-        .all_attributes()
-        .non_parallel()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(|e| format!("no layer with R, G and B can be read: {e}"))?;
-    image.layer_data.channel_data.pixels
+    let limits = exr::Limits { size: check_size, block_bytes: MAX_BLOCK_BYTES };
+    let image = exr::Image::open(Cursor::new(bytes), &limits)?;
+    let size = image.header().layer_size;
+    let mut map = Downsampled::new(size.0, size.1)?;
+    image.decode(|[x, y], rgb| map.add(x, y, rgb))?;
+    Ok(map)
 }
 
 fn check_size(width: usize, height: usize) -> Result<(), String> {

@@ -20,6 +20,19 @@ fn exr_bytes(width: usize, height: usize, value: impl Fn(usize, usize) -> [f32; 
     bytes.into_inner()
 }
 
+/// Each channel of 8 × 4 texels has its number.
+fn exr_channels(names: &[&str]) -> Vec<u8> {
+    use exr::prelude::*;
+    let channel = |(i, name): (usize, &&str)| AnyChannel::new(*name, FlatSamples::F32(vec![i as f32 + 0.5; 32]));
+    let channels = AnyChannels::sort(names.iter().enumerate().map(channel).collect());
+    let attributes = LayerAttributes { layer_position: Vec2(-3, 7), ..LayerAttributes::default() };
+    let mut image = Image::from_layer(Layer::new((8, 4), attributes, Encoding::SMALL_LOSSLESS, channels));
+    image.attributes.display_window = IntegerBounds::from_dimensions((100, 50));
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image.write().to_buffered(&mut bytes).unwrap();
+    bytes.into_inner()
+}
+
 #[test]
 fn hdr_and_exr_are_read() {
     let folder = Folder::new();
@@ -33,6 +46,24 @@ fn hdr_and_exr_are_read() {
     assert_eq!((map.width, map.height), (3, 2));
     assert_eq!(map.texels[5], Vec3::new(2.0, 1.0, 0.0));
     assert!(warnings[0].contains("2 texels") && warnings[0].contains("sky.exr"), "{warnings:?}");
+}
+
+/// The map is the data window, wherever it is.
+#[test]
+fn layers_and_grey_are_read() {
+    let folder = Folder::new();
+    let combined = ["ViewLayer.Combined.R", "ViewLayer.Combined.G", "ViewLayer.Combined.B", "ViewLayer.Combined.A"];
+    let beside = ["Combined.R", "Combined.G", "Combined.B", "Depth.Z", "Diffuse.R", "Diffuse.G", "Diffuse.B"];
+    for (names, texel) in [(&combined[..], [0.5, 1.5, 2.5]), (&beside, [0.5, 1.5, 2.5]), (&["A", "Y"], [1.5; 3])] {
+        let (map, warnings) = load_environment(&folder.write("sky.exr", exr_channels(names))).unwrap();
+        assert_eq!((map.width, map.height, warnings.len()), (8, 4, 0));
+        assert!(map.texels.iter().all(|&found| found == Vec3::from(texel)), "{names:?}: {}", map.texels[0]);
+    }
+    let refused = [(&["Z"][..], "no channels R, G and B"), (&["a.R", "a.G", "a.B", "b.R", "b.G", "b.B"], "layers")];
+    for (names, word) in refused {
+        let error = load_environment(&folder.write("sky.exr", exr_channels(names))).unwrap_err().to_string();
+        assert!(error.contains("sky.exr: ") && error.contains(word), "{error}");
+    }
 }
 
 #[test]
@@ -67,16 +98,20 @@ fn lies_are_refused() {
     refuse("huge.exr", &huge);
 }
 
+/// With one byte changed: what is read has its size, and what is not names the file.
 #[test]
 fn damaged_maps_do_not_panic() {
     let folder = Folder::new();
-    let original = exr_bytes(16, 8, |x, y| [x as f32, y as f32, 1.0]);
-    for i in (0..original.len().min(600)).step_by(2) {
-        for value in [0, 255] {
-            let mut bytes = original.clone();
-            bytes[i] = value;
-            if let Ok((map, _)) = load_environment(&folder.write("sky.exr", bytes)) {
-                assert_eq!(map.texels.len(), (map.width * map.height) as usize);
+    let plain = exr_bytes(16, 8, |x, y| [x as f32, y as f32, 1.0]);
+    for original in [plain, exr_channels(&["Combined.R", "Combined.G", "Combined.B"]), exr_channels(&["Y"])] {
+        for i in (0..original.len().min(600)).step_by(2) {
+            for value in [0, 255] {
+                let mut bytes = original.clone();
+                bytes[i] = value;
+                match load_environment(&folder.write("sky.exr", bytes)) {
+                    Ok((map, _)) => assert_eq!(map.texels.len(), (map.width * map.height) as usize),
+                    Err(e) => assert!(e.to_string().contains("sky.exr"), "{e}"),
+                }
             }
         }
     }
