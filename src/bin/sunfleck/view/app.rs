@@ -98,7 +98,7 @@ pub struct Viewer {
     /// Index into the scene's materials.
     pub selected: Option<usize>,
     /// Where the picture of which scene goes without asking; of the first that is opened, if none is named.
-    pub saved_as: Option<(Option<Arc<Choice>>, PathBuf)>,
+    pub saved_as: Vec<(Option<Arc<Choice>>, PathBuf)>,
     last_save: LastSave,
     pub convergence: super::convergence::Convergence,
     pub timing: super::timing::Timing,
@@ -127,7 +127,7 @@ impl Viewer {
     pub fn new(engine: Engine, wake: Wake, first: First) -> Self {
         let now = engine.now();
         let wanted = Wanted { scene: first.choice.map(Arc::new), limits: first.limits, ..Wanted::default() };
-        let saved_as = first.output.map(|path| (wanted.scene.clone(), path));
+        let saved_as = first.output.map(|path| (wanted.scene.clone(), path)).into_iter().collect();
         Self {
             engine,
             wanted,
@@ -338,7 +338,13 @@ impl Viewer {
 
     /// Where saving goes without asking.
     pub fn place(&self) -> Option<&PathBuf> {
-        self.saved_as.as_ref().filter(|(scene, _)| *scene == self.wanted.scene).map(|(_, path)| path)
+        self.saved_as.iter().find(|(scene, _)| *scene == self.wanted.scene).map(|(_, path)| path)
+    }
+
+    /// Where the picture of the scene goes from now on, as long as the program runs.
+    pub fn set_place(&mut self, path: PathBuf) {
+        self.saved_as.retain(|(scene, _)| *scene != self.wanted.scene);
+        self.saved_as.push((self.wanted.scene.clone(), path));
     }
 
     /// Shows a message.
@@ -453,7 +459,10 @@ impl Viewer {
                         self.picture = PictureView::default();
                     }
                 }
-                if let Some((scene @ None, _)) = &mut self.saved_as {
+                // It may have been saved under another path to the same file, or with other settings.
+                let is_it =
+                    |scene: &Option<Arc<Choice>>| scene.as_ref().is_none_or(|s| s.is_same_scene(&opened.choice));
+                if let Some((scene, _)) = self.saved_as.iter_mut().find(|(scene, _)| is_it(scene)) {
                     *scene = Some(Arc::clone(&opened.choice));
                 }
             }

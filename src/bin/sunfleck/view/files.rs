@@ -142,7 +142,7 @@ pub fn poll(ui: &egui::Ui, viewer: &mut Viewer) {
         Purpose::Open => viewer.open(path.to_string_lossy()),
         Purpose::SavePicture => match crate::job::check_format(&path) {
             Ok(()) => {
-                viewer.saved_as = Some((scene, path.clone()));
+                viewer.set_place(path.clone());
                 viewer.save_to(path);
             }
             Err(why) => viewer.say(ui, Message::Error(why)),

@@ -59,6 +59,14 @@ pub struct Choice {
     pub set: Vec<String>,
 }
 
+impl Choice {
+    /// Whether both are of one file, or of one shipped scene.
+    pub fn is_same_scene(&self, other: &Self) -> bool {
+        let file = |choice: &Self| Path::new(&choice.name).canonicalize().ok();
+        self.name == other.name || file(self).is_some_and(|name| Some(name) == file(other))
+    }
+}
+
 /// What the interface wants. Cheap to clone and to compare.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Wanted {

@@ -39,7 +39,7 @@ fn a_picture_is_saved_under_no_other_name() {
     window.viewer().pick = Arc::new(move |_, _| Answer::File(asked.clone()));
     window.press(Modifiers::COMMAND, Key::S);
     window.wait_for_message("picture.jpg: a picture ends in .exr or .png");
-    assert!(window.viewer().saved_as.is_none() && !wrong.exists());
+    assert!(window.viewer().saved_as.is_empty() && !wrong.exists());
 }
 
 #[test]

@@ -8,6 +8,7 @@ use sunfleck::scene::settings::Count;
 
 use super::Window;
 use crate::view::engine::{Comparison, Phase, View};
+use crate::view::files::Answer;
 
 /// A press or a release of a key that has another name with Shift.
 fn key(key: Key, physical: Key, pressed: bool, modifiers: Modifiers) -> [Event; 2] {
@@ -181,13 +182,13 @@ fn a_broken_file_leaves_the_picture() {
 fn a_picture_is_not_saved_over_that_of_another_scene() {
     let (mut window, _) = with_file(OWN);
     let place = window.path("place.exr");
-    window.viewer().saved_as = Some((window.viewer().wanted.scene.clone(), place.clone()));
+    window.viewer().set_place(place.clone());
     assert_eq!(window.viewer().place(), Some(&place));
     window.viewer().open("glass");
     assert_eq!(window.viewer().place(), None);
     // Without a scene it is for the first that is opened.
     let mut window = Window::new(None);
-    window.viewer().saved_as = Some((None, place.clone()));
+    window.viewer().saved_as = vec![(None, place.clone())];
     window.viewer().open("no such scene");
     window.wait("failure", |viewer| matches!(viewer.now.phase, Phase::Failed(_)));
     for (scene, expected) in [("cornell", Some(&place)), ("glass", None)] {
@@ -195,6 +196,40 @@ fn a_picture_is_not_saved_over_that_of_another_scene() {
         window.wait("scene", |viewer| viewer.opened().is_some_and(|opened| opened.source.name == scene));
         assert_eq!(window.viewer().place(), expected);
     }
+}
+
+#[test]
+fn each_scene_keeps_the_name_of_its_picture() {
+    let (mut window, file) = with_file(OWN);
+    let folder = window.path("");
+    window.viewer().pick = std::sync::Arc::new(move |_, name| Answer::File(folder.join(format!("{name}.exr"))));
+    let save = |window: &mut Window, name: &str| {
+        let path = window.path(name);
+        let _ = std::fs::remove_file(&path);
+        window.press(Modifiers::COMMAND, Key::S);
+        window.wait(name, |_| path.exists());
+        window.wait("dialog's answer", |viewer| viewer.dialog.is_none());
+    };
+    save(&mut window, "own.exr");
+    window.viewer().open("glass");
+    window.wait("scene", |viewer| viewer.opened().is_some_and(|opened| opened.source.name == "glass"));
+    assert_eq!(window.viewer().place(), None);
+    window.viewer().edit_at(0.0, "size", |s| s.set("size=16x12").unwrap());
+    window.wait_for_picture();
+    save(&mut window, "glass.exr");
+    // Without asking, by whatever path it is opened.
+    window.viewer().pick = std::sync::Arc::new(|_, _| panic!("asked"));
+    let folder = file.parent().unwrap();
+    for file in [file.clone(), folder.join(".").join("own.toml")] {
+        window.viewer().open(file.to_string_lossy());
+        assert_ne!(window.viewer().place(), Some(&folder.join("glass.exr")));
+        let expected = folder.join("own.exr");
+        window.wait("name of the picture", move |viewer| viewer.place() == Some(&expected));
+        save(&mut window, "own.exr");
+    }
+    window.viewer().open("glass");
+    window.wait("scene", |viewer| viewer.opened().is_some_and(|opened| opened.source.name == "glass"));
+    assert_eq!(window.viewer().place(), Some(&folder.join("glass.exr")));
 }
 
 #[test]

@@ -144,8 +144,7 @@ const CASES: &[Case] = &[
     after(
         |window| {
             let path = window.path("picture.exr");
-            let scene = window.viewer().wanted.scene.clone();
-            window.viewer().saved_as = Some((scene, path));
+            window.viewer().set_place(path);
         },
         COMMAND,
         Key::S,
