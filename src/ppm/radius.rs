@@ -54,14 +54,25 @@ pub struct FirstRadii {
     /// Metres, `[h·w]`, above 0.
     pub each: Vec<f32>,
     /// Whether it was chosen for what is there, `[h·w]`. Elsewhere the pilot's path had nothing to gather (a lamp, the sky),
-    /// and the radius is that of pixels nearby, for a later path that has. A radius that is given is so everywhere.
+    /// and the radius is that of pixels nearby, for a later path that has. A radius that is given is so everywhere, until
+    /// [`FirstRadii::look_at`].
     pub gathers: Vec<bool>,
+}
+
+/// Whether there is something to gather at the end of an eye path.
+fn gathers(v: &EyeVertex) -> bool {
+    v.flags & EYE_GATHER != 0
 }
 
 impl FirstRadii {
     /// The same for `n` pixels, asked for.
     pub(super) fn fixed(radius: f32, n: usize) -> Self {
         Self { each: vec![radius; n], gathers: vec![true; n] }
+    }
+
+    /// Notes which pixels gather by the eye paths of an iteration: with a radius that is given nobody has traced any before.
+    pub fn look_at(&mut self, eye: &[EyeVertex]) {
+        self.gathers = eye.iter().map(gathers).collect();
     }
 
     /// Metres of the pixels that gather, row-major.
@@ -98,7 +109,6 @@ pub fn first_radii(
 ) -> Result<FirstRadii, Error> {
     let mut tree = PointBvh::default();
     tree.rebuild(photons.len(), |i| photons[i].position.into());
-    let gathers = |v: &EyeVertex| v.flags & EYE_GATHER != 0;
     let gathering = eye.iter().map(gathers).collect();
     // A first look at some of the pixels bounds the search for all of them.
     let every = (eye.len() / 4096).max(1);

@@ -305,6 +305,7 @@ fn a_fixed_radius_is_the_radius_of_every_pixel() {
     let radii = ppm::start(&mut stages, &params).expect("start");
     let frame = params.frame(1);
     assert_eq!(Iteration::new(&packed, &frame, &[], &radii.each, &[]).radii(), [0.25; 16]);
+    assert_eq!(radii.gathers, [true; 16]);
 }
 
 #[test]
@@ -321,6 +322,10 @@ fn only_pixels_that_gather_have_a_radius_to_tell() {
     stages.trace_eye(&params.frame(0)).expect("the pilot's paths");
     let vertices = stages.eye_vertices().expect("eye");
     assert!(vertices.iter().zip(&radii.gathers).all(|(v, &gathers)| gathers == (v.flags & EYE_GATHER != 0)));
+    let fixed = Params { radius: FirstRadius::Fixed(0.25), ..params.clone() };
+    let mut given = ppm::start(&mut stages, &fixed).expect("start");
+    given.look_at(&vertices);
+    assert!(given.gathers == radii.gathers && given.gathering().count() == n);
     // The others have one for paths that hit something later.
     assert!(radii.each.iter().all(|r| *r > 0.0 && r.is_finite()));
     let mut gathering: Vec<f32> = radii.gathering().collect();

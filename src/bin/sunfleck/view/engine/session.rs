@@ -7,7 +7,7 @@ use anyhow::Result;
 use sunfleck::inspect::{self, Split};
 use sunfleck::layout::Camera;
 use sunfleck::output::Picture;
-use sunfleck::ppm::{self, Error, Film, FirstRadii, Interrupt, Params, StageTimes, Stages};
+use sunfleck::ppm::{self, Error, Film, FirstRadii, FirstRadius, Interrupt, Params, StageTimes, Stages};
 use sunfleck::scene::PackedScene;
 use sunfleck::scene::settings::Settings;
 
@@ -188,6 +188,9 @@ impl Session {
             self.set_radii(radii);
         } else {
             ppm::iterate(&mut *self.stages, &frame)?;
+        }
+        if let (0, FirstRadius::Fixed(_), Some(radii)) = (self.n_iterations, self.params.radius, &mut self.radii) {
+            Arc::make_mut(radii).look_at(&self.stages.eye_vertices()?);
         }
         self.is_whole = true;
         self.times += self.stages.times()?;

@@ -14,7 +14,7 @@ use sunfleck::scene::shipped::NAMES;
 use super::{Window, engine};
 use crate::cli::{Cli, Command};
 use crate::view::app::{First, Viewer};
-use crate::view::engine::{Choice, Comparison, Phase, View};
+use crate::view::engine::{Choice, Comparison, NOTHING, Phase, View};
 use crate::view::files::Purpose;
 use crate::view::keys::SHORTCUTS;
 
@@ -357,6 +357,28 @@ fn every_view_and_comparison_is_painted() {
     }
     window.activate("Clear");
     window.wait("no reference", |viewer| viewer.now.reference.is_none());
+}
+
+/// Beside the box is nothing to gather, whoever chose the radius.
+#[test]
+fn where_nothing_is_gathered_no_radius_is_shown() {
+    let mut window = Window::with_picture();
+    for radius in ["automatic", "0.05"] {
+        window.viewer().edit_at(0.0, "test", |s| {
+            s.set("camera.yfov_degrees=120").unwrap();
+            s.set(&format!("radius={radius}")).unwrap();
+        });
+        window.viewer().wanted.painting.view = View::Radius;
+        window.wait("radii", |viewer| {
+            viewer.picture.painted().is_some_and(|painted| {
+                painted.painting.view == View::Radius && *painted.frame.settings == **viewer.edits.now()
+            })
+        });
+        let painted = window.viewer().picture.painted().unwrap().clone();
+        let pixel = |x: usize, y: usize| &painted.rgba[4 * (32 * y + x)..][..4];
+        assert!(painted.value(0, 0) == [0.0] && pixel(0, 0) == NOTHING, "{radius}");
+        assert!(painted.value(16, 12)[0] > 0.0 && pixel(16, 12) != NOTHING, "{radius}");
+    }
 }
 
 #[test]
