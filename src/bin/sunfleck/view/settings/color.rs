@@ -2,7 +2,10 @@
 
 use eframe::egui;
 use egui::ecolor::Hsva;
-use egui::{Color32, Mesh, Popup, PopupCloseBehavior, Response, Rgba, Role, Sense, Stroke, Ui, WidgetInfo, vec2};
+use egui::{
+    Color32, Key, Mesh, Modifiers, Popup, PopupCloseBehavior, Response, Rgba, Role, Sense, Stroke, Tooltip, Ui,
+    WidgetInfo, vec2,
+};
 
 use super::number::{Number, drag_sized};
 use super::widgets::named;
@@ -34,6 +37,7 @@ pub fn color(ui: &mut Ui, name: &str, color: &mut [f32; 3], most: f32) -> Respon
         ui.set_style(style);
         ui.set_width(WIDTH);
         hues(ui, color).on_hover_text("Hue, and upwards how strong it is. The largest of the three numbers stays.");
+        let mut is_left = false;
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             for (i, (value, name)) in color.iter_mut().zip(["R", "G", "B"]).enumerate() {
@@ -42,7 +46,7 @@ pub fn color(ui: &mut Ui, name: &str, color: &mut [f32; 3], most: f32) -> Respon
                 let each = vec2(each, ui.spacing().interact_size.y);
                 let speed = f64::from(value.clamp(0.1, 1e3)) * 0.01;
                 let number = drag_sized(ui, each, value, Number::Plain, speed, 0.0..=most);
-                named(number, name).on_hover_text(format!("{name}, linear"));
+                is_left |= named(number, name).on_hover_text(format!("{name}, linear")).lost_focus();
             }
         });
         let largest = color.iter().copied().fold(0.0, f32::max);
@@ -52,8 +56,13 @@ pub fn color(ui: &mut Ui, name: &str, color: &mut [f32; 3], most: f32) -> Respon
             let speed = f64::from(largest.clamp(1e-2, 1e6)) * 0.01;
             let size = vec2(ui.available_width(), ui.spacing().interact_size.y);
             // Above 0, where the ratio of the three would be lost.
-            named(drag_sized(ui, size, &mut next, Number::Plain, speed, 1e-6..=most), "Largest")
+            is_left |=
+                named(drag_sized(ui, size, &mut next, Number::Plain, speed, 1e-6..=most), "Largest").lost_focus();
         });
+        if is_left {
+            // It took the number back, which is enough for one press: else it would close the popup, too.
+            ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Escape));
+        }
         if next != largest {
             *color = color.map(|c| if c == largest { next } else { c * (next / largest) });
         }

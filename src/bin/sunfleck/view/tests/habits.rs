@@ -1,7 +1,7 @@
 //! What people do without thinking: Escape, keys let go in any order, reading a file again, going back.
 
 use eframe::egui;
-use egui::{Event, Key, Modifiers, ViewportCommand};
+use egui::{Event, Key, Modifiers, Role, ViewportCommand};
 use egui_kittest::kittest::Queryable;
 use sunfleck::output::difference::Measure;
 use sunfleck::scene::settings::Count;
@@ -53,7 +53,7 @@ fn escape_is_first_for_what_is_open() {
     window.viewer().selected = Some(0);
     window.steps(2);
     // A list.
-    window.harness.get_by_role_and_label(egui::accesskit::Role::ComboBox, "Show").click_accesskit();
+    window.harness.get_by_role_and_label(Role::ComboBox, "Show").click_accesskit();
     window.steps(3);
     assert!(window.shows("Albedo"));
     window.press(Modifiers::NONE, Key::Escape);
@@ -61,7 +61,7 @@ fn escape_is_first_for_what_is_open() {
     assert!(!window.shows("Albedo") && window.viewer().selected == Some(0));
     // A field: what was typed is forgotten.
     let before = window.viewer().edits.now().clone();
-    window.harness.get_by_role_and_label(egui::accesskit::Role::SpinButton, "Seed").click();
+    window.harness.get_by_role_and_label(Role::SpinButton, "Seed").click();
     window.steps(3);
     for digit in ["7", "7"] {
         window.harness.input_mut().events.push(Event::Text(digit.to_owned()));
@@ -71,6 +71,32 @@ fn escape_is_first_for_what_is_open() {
     window.steps(3);
     assert_eq!(window.viewer().edits.now().difference(&before), [""; 0]);
     assert_eq!(window.viewer().selected, Some(0));
+    window.press(Modifiers::NONE, Key::Escape);
+    assert_eq!(window.viewer().selected, None);
+}
+
+/// In the window of a colour it takes a number back first, then closes it, then selects nothing.
+#[test]
+fn escape_does_one_thing_at_a_time_to_a_colour() {
+    let mut window = Window::with_picture();
+    window.viewer().selected = Some(0);
+    window.steps(2);
+    let before = window.viewer().edits.now().clone();
+    window.harness.get_by_role_and_label(Role::ColorWell, "Base colour").click_accesskit();
+    window.steps(5);
+    for field in ["G", "Largest"] {
+        window.harness.get_by_role_and_label(Role::SpinButton, field).click();
+        window.steps(3);
+        window.harness.input_mut().events.push(Event::Text("0.5".to_owned()));
+        window.step();
+        window.press(Modifiers::NONE, Key::Escape);
+        window.steps(3);
+        assert!(window.shows("Largest"), "{field}");
+        assert_eq!(*window.viewer().edits.now(), before, "{field}");
+    }
+    window.press(Modifiers::NONE, Key::Escape);
+    window.steps(3);
+    assert!(!window.shows("Largest") && window.viewer().selected == Some(0));
     window.press(Modifiers::NONE, Key::Escape);
     assert_eq!(window.viewer().selected, None);
 }
@@ -337,12 +363,7 @@ fn limits_wait_for_the_whole_number() {
     let mut window = Window::with_picture();
     let before = window.viewer().wanted.limits;
     let field = |window: &mut Window, text: &str, end: Key| {
-        window
-            .harness
-            .get_all_by_role(egui::accesskit::Role::SpinButton)
-            .find(|node| node.rect().top() < 30.0)
-            .unwrap()
-            .click();
+        window.harness.get_all_by_role(Role::SpinButton).find(|node| node.rect().top() < 30.0).unwrap().click();
         window.steps(3);
         for letter in text.chars() {
             window.harness.input_mut().events.push(Event::Text(letter.to_string()));
