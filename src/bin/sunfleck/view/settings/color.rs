@@ -3,8 +3,8 @@
 use eframe::egui;
 use egui::ecolor::Hsva;
 use egui::{
-    Color32, Key, Mesh, Modifiers, Popup, PopupCloseBehavior, Response, Rgba, Role, Sense, Stroke, Tooltip, Ui,
-    WidgetInfo, vec2,
+    Color32, Key, Mesh, Modifiers, Popup, PopupCloseBehavior, RectAlign, Response, Rgba, Role, Sense, Stroke, Tooltip,
+    Ui, WidgetInfo, vec2,
 };
 
 use super::number::{Number, drag_sized};
@@ -36,7 +36,7 @@ pub fn color(ui: &mut Ui, name: &str, color: &mut [f32; 3], most: f32) -> Respon
     popup.width(WIDTH).show(|ui| {
         ui.set_style(style);
         ui.set_width(WIDTH);
-        hues(ui, color).on_hover_text("Hue, and upwards how strong it is. The largest of the three numbers stays.");
+        beside(&hues(ui, color), "Hue, and upwards how strong it is. The largest of the three numbers stays.");
         let mut is_left = false;
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
@@ -71,6 +71,14 @@ pub fn color(ui: &mut Ui, name: &str, color: &mut [f32; 3], most: f32) -> Respon
         response.mark_changed();
     }
     response
+}
+
+/// A tooltip to one side, not over what is below.
+fn beside(response: &Response, text: &str) {
+    let mut tooltip = Tooltip::for_enabled(response).width(WIDTH);
+    let others = &[RectAlign::LEFT_START, RectAlign::TOP];
+    tooltip.popup = tooltip.popup.align(RectAlign::RIGHT_START).align_alternatives(others);
+    tooltip.show(|ui| ui.label(text));
 }
 
 /// As a screen shows it; what is too bright keeps its hue.

@@ -220,6 +220,19 @@ fn colours_are_linear_and_of_any_size() {
 }
 
 #[test]
+fn the_hint_of_the_hues_leaves_the_numbers_in_sight() {
+    let mut window = panel(|_| {});
+    window.harness.get_by_role_and_label(Role::ColorWell, "Base colour").click_accesskit();
+    window.steps(5);
+    let field = |window: &Window, name: &str| window.harness.get_by_role_and_label(Role::SpinButton, name).rect();
+    let [red, largest] = ["R", "Largest"].map(|name| field(&window, name));
+    window.harness.input_mut().events.push(Event::PointerMoved(red.left_top() + egui::vec2(40.0, -60.0)));
+    window.steps(60);
+    let hint = window.harness.get_by_label_contains("The largest of the three numbers stays").rect();
+    assert!(!hint.intersects(red.union(largest)), "{hint} {red} {largest}");
+}
+
+#[test]
 fn rows_that_cannot_matter_are_greyed_out() {
     let mut window = panel(|_| {});
     let idle = |window: &Window| {
