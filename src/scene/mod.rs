@@ -64,7 +64,7 @@ pub struct Sphere {
 }
 
 /// glTF's metallic-roughness material with transmission, index of refraction, volume and specular weight.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// For messages and for selection.
     pub name: String,
@@ -188,7 +188,7 @@ pub enum AlphaMode {
 }
 
 /// One use of an image.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Texture {
     /// Index into [`Scene::images`].
     pub image: usize,
@@ -243,7 +243,7 @@ pub struct Image {
 }
 
 /// A light without extent.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PunctualLight {
     /// For messages and for selection; may be empty.
     pub name: String,

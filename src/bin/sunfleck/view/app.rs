@@ -216,8 +216,17 @@ impl Viewer {
     /// Changes the settings; `what` names what is edited, for undo.
     pub fn edit(&mut self, ui: &egui::Ui, what: &'static str, change: impl FnOnce(&mut Settings)) {
         let (time, is_dragging) = ui.input(|i| (i.time, i.pointer.is_decidedly_dragging()));
-        self.edit_at(time, what, change);
-        if is_dragging {
+        match is_dragging {
+            true => self.preview_of(time, |viewer| viewer.edit_at(time, what, change)),
+            false => self.edit_at(time, what, change),
+        }
+    }
+
+    /// Changes something at `time`, seconds: previews until it rests, if it changes what is rendered.
+    pub fn preview_of(&mut self, time: f64, change: impl FnOnce(&mut Self)) {
+        let before = self.wanted.clone();
+        change(self);
+        if self.editing.as_ref().is_some_and(|opened| is_asked_anew(opened, &before, &self.wanted)) {
             self.picture.move_on(time);
         }
     }

@@ -271,20 +271,15 @@ fn move_camera(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, response: &egui::
     let height = shown.height().max(1.0);
     let drag = response.drag_delta() / height;
     let (shift, command) = ui.input(|i| (i.modifiers.shift, i.modifiers.command));
-    let mut moves = false;
-    let mut act = |viewer: &mut Viewer, change: &mut dyn FnMut(&mut Rig)| {
-        viewer.move_rig(time, change);
-        moves = true;
-    };
     if drag != Vec2::ZERO && !command {
         let is_pan = response.dragged_by(PointerButton::Middle) || shift && response.dragged_by(PointerButton::Primary);
         if is_pan {
-            act(viewer, &mut |rig| rig.pan(glam::vec2(drag.x, drag.y)));
+            viewer.move_rig(time, &mut |rig| rig.pan(glam::vec2(drag.x, drag.y)));
         } else if response.dragged_by(PointerButton::Primary) {
             // What is in front of the pivot follows the cursor.
-            act(viewer, &mut |rig| rig.orbit(ORBIT * turn.x, -ORBIT * turn.y));
+            viewer.move_rig(time, &mut |rig| rig.orbit(ORBIT * turn.x, -ORBIT * turn.y));
         } else if response.dragged_by(PointerButton::Secondary) {
-            act(viewer, &mut |rig| rig.look(LOOK * turn.x, -LOOK * turn.y));
+            viewer.move_rig(time, &mut |rig| rig.look(LOOK * turn.x, -LOOK * turn.y));
         }
     }
     // On the reference's line too, which takes the pointer for itself.
@@ -294,7 +289,7 @@ fn move_camera(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, response: &egui::
             let pointer = ui.input(|i| i.pointer.latest_pos());
             let under = pointer.and_then(|p| under(viewer, shown, p));
             let cursor = pointer.map(|p| (p - shown.center()) / height).map(|p| glam::vec2(p.x, p.y));
-            act(viewer, &mut |rig| rig.zoom(wheel * WHEEL, cursor, under));
+            viewer.move_rig(time, &mut |rig| rig.zoom(wheel * WHEEL, cursor, under));
         }
     }
     let typing = ui.ctx().text_edit_focused();
@@ -313,13 +308,9 @@ fn move_camera(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, response: &egui::
             };
             (pace, i.stable_dt)
         });
-        act(viewer, &mut |rig| rig.fly(direction.normalize(), pace, seconds));
+        viewer.move_rig(time, &mut |rig| rig.fly(direction.normalize(), pace, seconds));
     }
-    let view = &mut viewer.picture;
-    if moves {
-        view.moved = Some(time);
-    }
-    let rests = view.moved.is_none_or(|moved| time - moved > REST) && direction == Vec3::ZERO;
+    let rests = viewer.picture.moved.is_none_or(|moved| time - moved > REST) && direction == Vec3::ZERO;
     viewer.wanted.moving = !rests;
     if !rests {
         // Again soon, to see that it rests.
@@ -370,16 +361,19 @@ impl Viewer {
         self.picture.rig.as_mut().map(|(_, rig)| rig)
     }
 
-    /// Moves the camera, and with it the settings; previews until it rests.
+    /// Moves the camera, and with it the settings; previews until it rests, if it shows another picture.
     pub fn move_rig(&mut self, time: f64, change: &mut dyn FnMut(&mut Rig)) {
-        self.change_rig(time, change);
-        self.picture.move_on(time);
+        self.preview_of(time, |viewer| viewer.change_rig(time, change));
     }
 
     fn change_rig(&mut self, time: f64, change: &mut dyn FnMut(&mut Rig)) {
         let Some(rig) = self.rig() else { return };
+        let before = CameraSettings::from(rig.camera());
         change(rig);
         let camera = CameraSettings::from(rig.camera());
+        if camera == before {
+            return;
+        }
         self.edit_at(time, "camera", |settings| settings.camera = Some(camera));
         if let Some((of, _)) = &mut self.picture.rig {
             *of = Arc::clone(self.edits.now());

@@ -1,12 +1,13 @@
 //! The render thread.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::Result;
 use sunfleck::layout;
-use sunfleck::ppm::Error;
-use sunfleck::scene::Accelerator;
-use sunfleck::scene::settings::{Index, Settings};
+use sunfleck::ppm::{Error, Params};
+use sunfleck::scene::settings::{Count, Direct, FirstRadius, Index, Kernel, Settings, Size};
+use sunfleck::scene::{Accelerator, Scene};
 
 use super::reading::{self, Reader};
 use super::session::Session;
@@ -270,30 +271,69 @@ pub fn is_asked_anew(opened: &Opened, before: &Wanted, now: &Wanted) -> bool {
     before.restarts != now.restarts || !is_rendered_alike(opened, before, now)
 }
 
-/// Whether the settings leave the estimate as it is. Quick where they are the same.
+/// Whether the settings leave the estimate as it is, however they say it. Quick where they are the same.
 fn is_rendered_alike(opened: &Opened, before: &Wanted, now: &Wanted) -> bool {
-    is_same(before.settings.as_ref(), now.settings.as_ref()) || rendered(opened, before) == rendered(opened, now)
+    let [a, b] = [before, now].map(|wanted| wanted.settings.as_deref().unwrap_or(&opened.source.settings));
+    is_same(before.settings.as_ref(), now.settings.as_ref())
+        || rendered(opened, a) == rendered(opened, b) && is_changed_alike(&opened.loaded.scene, a, b)
 }
 
-/// Those settings that the estimate depends on: of the camera, what it comes to.
-fn rendered(opened: &Opened, wanted: &Wanted) -> (Settings, Option<(layout::Camera, Option<f32>)>) {
-    let settings = wanted.settings.as_deref().unwrap_or(&opened.source.settings);
+/// Those settings that the estimate depends on, but for the changes to materials and lights: of the camera, what it comes to.
+fn rendered(opened: &Opened, settings: &Settings) -> (Settings, Option<layout::Camera>) {
     let camera = settings.camera_of(&opened.loaded.scene.cameras).ok().map(|mut camera| {
         if camera.aperture_radius == 0.0 {
             camera.focus_distance = 1.0;
         }
-        (camera.pack(1, 1), camera.aspect)
+        camera
     });
-    let of_camera = settings.camera.clone().filter(|_| camera.is_none());
-    let of_display = Settings { exposure: None, tonemap: None, ..searched(settings) };
-    (Settings { iterations: None, seconds: None, camera: of_camera, ..of_display }, camera)
+    let rest = Settings {
+        size: camera.as_ref().map_or(settings.size, |camera| Some(Size(job::size(settings, camera)))),
+        iterations: None,
+        seconds: None,
+        exposure: None,
+        tonemap: None,
+        camera: settings.camera.clone().filter(|_| camera.is_none()),
+        materials: vec![],
+        scene_lights: vec![],
+        ..without_defaults(settings)
+    };
+    (rest, camera.map(|camera| camera.pack(1, 1)))
 }
 
-/// The same, with nothing in the place of the default ways to search.
-fn searched(settings: &Settings) -> Settings {
-    let index = settings.index.filter(|&index| index != Index::default());
-    let accel = settings.accel.filter(|&accel| accel != Accelerator::default());
-    Settings { index, accel, ..settings.clone() }
+/// Whether the changes to materials and lights come to the same.
+fn is_changed_alike(scene: &Scene, before: &Settings, now: &Settings) -> bool {
+    let changed = |settings: &Settings| {
+        let Scene { materials, lights, cameras, .. } = scene;
+        let (materials, lights, cameras) = (materials.clone(), lights.clone(), cameras.clone());
+        let mut changed = Scene { materials, lights, cameras, ..Scene::default() };
+        let Settings { materials, scene_lights, .. } = settings.clone();
+        let changes = Settings { materials, scene_lights, ..Settings::default() };
+        changes.apply_to_scene(&mut changed, Path::new("")).ok()?;
+        Some((changed.materials, changed.lights))
+    };
+    (&before.materials, &before.scene_lights) == (&now.materials, &now.scene_lights)
+        || changed(before).is_some_and(|before| Some(before) == changed(now))
+}
+
+/// The same, with nothing in the place of the defaults.
+fn without_defaults(settings: &Settings) -> Settings {
+    /// None if it is the default.
+    fn other<T: Copy + PartialEq>(value: Option<T>, default: T) -> Option<T> {
+        value.filter(|value| *value != default)
+    }
+    let params = Params::new(1, 1);
+    Settings {
+        photons: other(settings.photons, Count(params.n_paths)),
+        alpha: other(settings.alpha, params.alpha),
+        radius: other(settings.radius, FirstRadius::default()),
+        kernel: other(settings.kernel, Kernel::default()),
+        direct: other(settings.direct, Direct::default()),
+        index: other(settings.index, Index::default()),
+        accel: other(settings.accel, Accelerator::default()),
+        seed: other(settings.seed, params.seed),
+        light_scale: other(settings.light_scale, 1.0),
+        ..settings.clone()
+    }
 }
 
 /// Those settings that change the scene or how it is searched: not the camera, not the rest of the estimator's.
@@ -312,6 +352,6 @@ fn of_scene(settings: &Settings) -> Settings {
         tonemap: None,
         max_segments: None,
         camera: None,
-        ..searched(settings)
+        ..without_defaults(settings)
     }
 }

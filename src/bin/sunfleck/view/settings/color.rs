@@ -15,10 +15,11 @@ const WIDTH: f32 = 210.0;
 /// Cells of the field of hues and saturations, along each side: hues bend at every sixth of it.
 const CELLS: [usize; 2] = [24, 8];
 
-/// A button of the colour, which opens a field of hues and the three numbers, linear and at most `most`.
+/// A button of the colour, which opens a field of hues and the three numbers, linear and at most `most`; of any size if only
+/// their ratio matters.
 ///
 /// Not egui's picker: that one keeps colours as hues, and with a largest component of 1.
-pub fn color(ui: &mut Ui, name: &str, color: &mut [f32; 3], most: f32) -> Response {
+pub fn color(ui: &mut Ui, name: &str, color: &mut [f32; 3], most: Option<f32>) -> Response {
     let old = *color;
     let (rect, mut response) = ui.allocate_exact_size(ui.spacing().interact_size, Sense::click());
     response.widget_info(|| WidgetInfo::labeled(Role::ColorWell, ui.is_enabled(), name));
@@ -45,32 +46,39 @@ pub fn color(ui: &mut Ui, name: &str, color: &mut [f32; 3], most: f32) -> Respon
                 let each = ((ui.available_width() - 16.0 * (2 - i) as f32) / (3 - i) as f32).floor();
                 let each = vec2(each, ui.spacing().interact_size.y);
                 let speed = f64::from(value.clamp(0.1, 1e3)) * 0.01;
-                let number = drag_sized(ui, each, value, Number::Plain, speed, 0.0..=most);
+                let number = drag_sized(ui, each, value, Number::Plain, speed, 0.0..=most.unwrap_or(f32::MAX));
                 is_left |= named(number, name).on_hover_text(format!("{name}, linear")).lost_focus();
             }
         });
-        let largest = color.iter().copied().fold(0.0, f32::max);
-        let mut next = largest;
-        ui.horizontal(|ui| {
-            ui.label("Largest").on_hover_text("Multiplies all three.");
-            let speed = f64::from(largest.clamp(1e-2, 1e6)) * 0.01;
-            let size = vec2(ui.available_width(), ui.spacing().interact_size.y);
-            // Above 0, where the ratio of the three would be lost.
-            is_left |=
-                named(drag_sized(ui, size, &mut next, Number::Plain, speed, 1e-6..=most), "Largest").lost_focus();
-        });
+        if let Some(most) = most {
+            is_left |= scale(ui, color, most).lost_focus();
+        }
         if is_left {
             // It took the number back, which is enough for one press: else it would close the popup, too.
             ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Escape));
-        }
-        if next != largest {
-            *color = color.map(|c| if c == largest { next } else { c * (next / largest) });
         }
     });
     if *color != old {
         response.mark_changed();
     }
     response
+}
+
+/// All three numbers at once.
+fn scale(ui: &mut Ui, color: &mut [f32; 3], most: f32) -> Response {
+    let largest = color.iter().copied().fold(0.0, f32::max);
+    let mut next = largest;
+    let response = ui.horizontal(|ui| {
+        ui.label("Largest").on_hover_text("Multiplies all three.");
+        let speed = f64::from(largest.clamp(1e-2, 1e6)) * 0.01;
+        let size = vec2(ui.available_width(), ui.spacing().interact_size.y);
+        // Above 0, where the ratio of the three would be lost.
+        named(drag_sized(ui, size, &mut next, Number::Plain, speed, 1e-6..=most), "Largest")
+    });
+    if next != largest {
+        *color = color.map(|c| if c == largest { next } else { c * (next / largest) });
+    }
+    response.inner
 }
 
 /// A tooltip to one side, not over what is below.

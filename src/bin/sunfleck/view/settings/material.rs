@@ -101,7 +101,7 @@ fn properties(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, 
     let mut base = before.base_color.unwrap_or(own.base_color.to_array());
     let mut changed = false;
     let reset = row(ui, BASE_COLOR, before.base_color != was.base_color, |ui| {
-        let response = color(ui, BASE_COLOR.name, &mut base, 1.0);
+        let response = color(ui, BASE_COLOR.name, &mut base, Some(1.0));
         changed = response.changed();
         response
     });

@@ -80,7 +80,7 @@ pub fn environment(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     if let Sky::Color(mut radiance) = sky {
         let mut changed = false;
         let reset = row(ui, COLOR, was.color.is_some() && given.color != was.color, |ui| {
-            let response = color(ui, COLOR.name, &mut radiance, f32::MAX);
+            let response = color(ui, COLOR.name, &mut radiance, Some(f32::MAX));
             changed = response.changed();
             response
         });
@@ -194,7 +194,7 @@ fn light(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, i: us
             let mut rgb = now.color.unwrap_or_else(|| hue(light.intensity));
             let hint =
                 "Its colour, linear RGB, of which only the ratio matters: it stays as bright. Restarts the estimate.";
-            let response = color(ui, &format!("Colour of {name}"), &mut rgb, f32::MAX).on_hover_text(hint);
+            let response = color(ui, &format!("Colour of {name}"), &mut rgb, None).on_hover_text(hint);
             if response.changed() && rgb != [0.0; 3] {
                 now.color = Some(rgb);
             }

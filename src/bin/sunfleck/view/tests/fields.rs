@@ -8,6 +8,7 @@ use sunfleck::scene::settings::{CameraSettings, Count, EnvironmentSettings, Firs
 
 use super::Window;
 use super::panels::bare;
+use crate::view::engine::is_asked_anew;
 
 /// With all groups of the settings open, and nothing beside them.
 fn panel(set: impl FnOnce(&mut Settings)) -> Window {
@@ -217,6 +218,73 @@ fn colours_are_linear_and_of_any_size() {
     let base = window.viewer().edits.now().materials[0].base_color.unwrap();
     assert_eq!(base[1], 1.0);
     assert_eq!(base[0], window.viewer().opened().unwrap().loaded.scene.materials[0].base_color.x);
+}
+
+/// A triangle, and a lamp without extent.
+const LAMP: &str = r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
+"nodes": [{"mesh": 0}, {"translation": [0, 0, 2], "extensions": {"KHR_lights_punctual": {"light": 0}}}],
+"extensionsUsed": ["KHR_lights_punctual"],
+"extensions": {"KHR_lights_punctual": {"lights": [{"name": "bulb", "type": "point", "intensity": 10}]}},
+"materials": [{"name": "paint"}],
+"meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+"accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [-1, -1, 0], "max": [1, 1, 0]}],
+"bufferViews": [{"buffer": 0, "byteLength": 36}],
+"buffers": [{"byteLength": 36, "uri": "data:application/octet-stream;base64,AACAvwAAgL8AAAAAAACAPwAAgL8AAAAAAAAAAAAAgD8AAAAA"}]}"#;
+
+/// Whether a change restarts the estimate.
+fn restarts(window: &mut Window, change: impl FnOnce(&mut Settings)) -> bool {
+    let before = window.viewer().wanted.clone();
+    window.viewer().edit_at(0.0, "test", change);
+    let viewer = window.viewer();
+    assert_ne!(viewer.wanted.settings, before.settings);
+    is_asked_anew(viewer.opened().unwrap(), &before, &viewer.wanted)
+}
+
+#[test]
+fn what_changes_nothing_restarts_nothing() {
+    let mut window = Window::new(None);
+    let [scene, file] = ["lamp.gltf", "lamp.toml"].map(|name| window.path(name));
+    std::fs::write(scene, LAMP).unwrap();
+    std::fs::write(&file, "scene = \"lamp.gltf\"\nsize = [16, 12]\nphotons = 200\n").unwrap();
+    window.viewer().open(file.to_str().unwrap());
+    window.wait_for_picture();
+    window.viewer().remembered.show_inspect = false;
+    window.steps(2);
+    // Typed again, or of no effect.
+    window.activate("Lights");
+    window.harness.get_by_role_and_label(Role::ColorWell, "Colour of bulb").click_accesskit();
+    window.steps(5);
+    assert!(!window.shows("Largest"), "only the ratio matters");
+    window.harness.get_by_role_and_label(Role::SpinButton, "R").focus();
+    end(&mut window, "1.0", Some(Key::Enter));
+    window.press(Modifiers::NONE, Key::Escape);
+    assert!(!window.viewer().edits.can_undo());
+    // Once for the camera, which is the settings' from then on; all is in focus.
+    let at = fields(&window, "Focus")[0].rect().center();
+    drag(&mut window, at, 20.0);
+    window.steps(30);
+    window.wait_for_picture();
+    let (estimate, before) = (window.viewer().now.estimate, window.viewer().edits.now().clone());
+    drag(&mut window, at, 20.0);
+    assert!(*window.viewer().edits.now() != before && !window.viewer().wanted.moving);
+    // Said otherwise.
+    let scene = window.viewer().opened().unwrap().loaded.scene.clone();
+    let own = &scene.materials[0];
+    assert!(!restarts(&mut window, |s| s.material_mut(&scene, 0).ior = Some(own.ior)));
+    assert!(!restarts(&mut window, |s| s.material_mut(&scene, 0).base_color = Some(own.base_color.to_array())));
+    assert!(!restarts(&mut window, |s| s.scene_light_mut(&scene, 0).strength = Some(1.0)));
+    assert!(!restarts(&mut window, |s| s.set("seed=0").unwrap()));
+    assert!(!restarts(&mut window, |s| s.set("light_scale=1").unwrap()));
+    assert!(!restarts(&mut window, |s| s.set("radius=automatic").unwrap()));
+    window.wait_for_picture();
+    assert_eq!(window.viewer().now.estimate, estimate);
+    assert!(restarts(&mut window, |s| s.scene_light_mut(&scene, 0).color = Some([1.0, 0.5, 0.5])));
+    assert!(!restarts(&mut window, |s| s.scene_light_mut(&scene, 0).color = Some([2.0, 1.0, 1.0])));
+    assert!(restarts(&mut window, |s| s.scene_light_mut(&scene, 0).on = Some(false)));
+    assert!(!restarts(&mut window, |s| s.scene_light_mut(&scene, 0).strength = Some(3.0)));
+    assert!(restarts(&mut window, |s| s.material_mut(&scene, 0).ior = Some(own.ior + 0.1)));
+    assert!(restarts(&mut window, |s| s.set("size=16x13").unwrap()));
+    assert!(restarts(&mut window, |s| s.set("light_scale=0.5").unwrap()));
 }
 
 #[test]
