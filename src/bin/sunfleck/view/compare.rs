@@ -72,7 +72,7 @@ fn comparisons() -> impl Iterator<Item = Comparison> + Clone {
 }
 
 /// Name, and what it is.
-fn describe(comparison: Comparison) -> (&'static str, &'static str) {
+pub fn describe(comparison: Comparison) -> (&'static str, &'static str) {
     match comparison {
         Comparison::Off => ("Off", "The picture alone; hold Shift to see the reference in its place"),
         Comparison::Wipe => ("Wipe", "The picture left of a line, the reference right of it; drag the line"),
@@ -248,7 +248,11 @@ pub fn overlay(ui: &egui::Ui, viewer: &mut Viewer, painter: &egui::Painter, rect
         if response.hovered() || response.dragged() { (2.5, Color32::WHITE) } else { (1.5, Color32::LIGHT_GRAY) };
     painter.vline(x + 1.0, visible.y_range(), Stroke::new(width + 1.0, Color32::from_black_alpha(140)));
     painter.vline(x, visible.y_range(), Stroke::new(width, color));
-    name(painter, pos2(x - HOLD, visible.top()), egui::Align2::RIGHT_TOP, "picture");
+    let left = match painted.painting.view {
+        View::Picture => "picture",
+        view => view.name(),
+    };
+    name(painter, pos2(x - HOLD, visible.top()), egui::Align2::RIGHT_TOP, left);
     name(painter, pos2(x + HOLD, visible.top()), egui::Align2::LEFT_TOP, &reference.name);
     if response.hovered() || response.dragged() {
         ui.ctx().set_cursor_icon(egui::CursorIcon::ResizeHorizontal);

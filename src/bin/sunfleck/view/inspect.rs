@@ -15,11 +15,15 @@ use sunfleck::ppm::film::luminance;
 
 use super::app::Viewer;
 use super::charts::{bar, bars, bounces, rgb, rgba, short};
-use super::engine::{Comparison, Legend, NOTHING, Painted, Values, View};
+use super::engine::{Comparison, Legend, Message, NOTHING, Painted, Values, View};
 use crate::progress::{decimals, length};
 
 /// Of what there is nothing to say about.
 const NONE: &str = "–";
+
+/// Why there is no view to choose.
+const NO_VIEW: &str =
+    "A difference is shown in the place of a view, which comes back with Off or Wipe under Compare (C)";
 
 /// Numbers over all of a picture, which are not counted anew in every frame of the window.
 #[derive(Default)]
@@ -56,8 +60,12 @@ fn shrunk(painted: &Painted) -> f32 {
 }
 
 impl Viewer {
-    /// The view `by` places further in the list, round its ends.
-    pub fn next_view(&mut self, by: isize) {
+    /// The view `by` places further in the list, round its ends; says so if none is shown.
+    pub fn next_view(&mut self, ui: &egui::Ui, by: isize) {
+        if self.picture.painted().is_some_and(|painted| painted.difference().is_some()) {
+            self.say(ui, Message::Warning(NO_VIEW.to_owned()));
+            return;
+        }
         let view = &mut self.wanted.painting.view;
         let at = View::ALL.iter().position(|v| v == view).unwrap_or(0) as isize;
         *view = View::ALL[(at + by).rem_euclid(View::ALL.len() as isize) as usize];
@@ -97,18 +105,18 @@ fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
     let painting = &mut viewer.wanted.painting;
     egui::Grid::new("view").num_columns(2).show(ui, |ui| {
         let label = ui.label("Show");
+        let difference = painted.and_then(Painted::difference).map(|of| super::compare::describe(of).0);
         let text = format!("{}. Does not restart the estimate. (V, Shift+V)", painting.view.describe());
-        egui::ComboBox::from_id_salt("view")
-            .selected_text(painting.view.name())
-            .height(400.0)
-            .show_ui(ui, |ui| {
+        let list = egui::ComboBox::from_id_salt("view").selected_text(difference.unwrap_or(painting.view.name()));
+        let list = |ui: &mut egui::Ui| {
+            list.height(400.0).show_ui(ui, |ui| {
                 for view in View::ALL {
                     ui.selectable_value(&mut painting.view, view, view.name()).on_hover_text(view.describe());
                 }
             })
-            .response
-            .on_hover_text(text)
-            .labelled_by(label.id);
+        };
+        let response = ui.add_enabled_ui(difference.is_none(), list).inner.response;
+        response.on_hover_text(text).on_disabled_hover_text(NO_VIEW).labelled_by(label.id);
         ui.end_row();
         let label = ui.label("Photons");
         let name = |photons| match photons {
@@ -154,13 +162,14 @@ fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
         ui.end_row();
     });
     let Some(painted) = painted else { return };
-    let waits = painted.painting.looks_inside() && painted.frame.insides.is_none();
-    if waits {
+    let view = Some(painted.painting.view).filter(|_| painted.difference().is_none());
+    let looks_inside = view.is_some_and(View::needs_photons);
+    if (looks_inside || painted.painting.photons.is_some()) && painted.frame.insides.is_none() {
         ui.weak("Waiting for an iteration's photons …");
-    } else if painted.painting.view == View::Variance && painted.frame.film.n_iterations < 2 {
+    } else if view == Some(View::Variance) && painted.frame.film.n_iterations < 2 {
         ui.weak("One iteration has no variance yet.");
     }
-    if let (true, Some(insides)) = (painted.painting.view.needs_photons(), &painted.frame.insides) {
+    if let (true, Some(insides)) = (looks_inside, &painted.frame.insides) {
         let text = match (painted.painting.view, insides.split.n_iterations) {
             (View::NodesVisited, _) => "Of the last iteration".to_owned(),
             (_, 1) => "Of one iteration".to_owned(),
@@ -207,14 +216,12 @@ fn signed_color(legend: &Legend, t: f32) -> Color32 {
 /// Of the numbers that are shown as colours.
 fn unit(painted: &Painted) -> &'static str {
     // Without a reference of its size the view is shown all the same.
-    if painted.mean.is_some() {
-        match painted.painting.comparison {
-            Comparison::Difference(Measure::Absolute | Measure::Signed) => return "W/(m² sr)",
-            Comparison::Difference(Measure::Squared) => return "(W/(m² sr))²",
-            Comparison::Difference(Measure::Relative | Measure::RelativeSquared) => return "relative",
-            Comparison::Flip => return "FLIP, 0 to 1",
-            Comparison::Off | Comparison::Wipe => {}
-        }
+    match painted.difference() {
+        Some(Comparison::Difference(Measure::Absolute | Measure::Signed)) => return "W/(m² sr)",
+        Some(Comparison::Difference(Measure::Squared)) => return "(W/(m² sr))²",
+        Some(Comparison::Difference(Measure::Relative | Measure::RelativeSquared)) => return "relative",
+        Some(Comparison::Flip) => return "FLIP, 0 to 1",
+        _ => {}
     }
     match painted.painting.view {
         View::Stops => "stops about mid grey",

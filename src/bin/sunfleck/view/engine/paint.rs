@@ -201,6 +201,13 @@ impl Painted {
         }
     }
 
+    /// The comparison that is shown in the place of the view, if one is.
+    pub fn difference(&self) -> Option<Comparison> {
+        let is_painted = self.reference.is_some() && self.problem.is_none();
+        let beside = matches!(self.painting.comparison, Comparison::Off | Comparison::Wipe);
+        (is_painted && !beside).then_some(self.painting.comparison)
+    }
+
     pub fn reduce(&mut self, most_side: Option<usize>) {
         let Some(most) = most_side.filter(|&most| self.size.iter().any(|&side| side > most)) else { return };
         let (size, rgba) = reduced(self.size, &self.rgba, most);

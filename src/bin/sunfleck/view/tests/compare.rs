@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 
+use eframe::egui;
+use egui::{Key, Modifiers, Role};
+use egui_kittest::kittest::{NodeT, Queryable};
 use sunfleck::output::Picture;
 use sunfleck::output::false_colour::NOT_FINITE;
 
 use super::Window;
-use crate::view::engine::{Comparison, Painted, Reference};
+use crate::view::engine::{Comparison, Painted, Reference, View};
 
 /// Compares the picture by FLIP with itself after `change`.
 fn compared(window: &mut Window, change: impl FnOnce(&mut Picture)) -> Arc<Painted> {
@@ -44,4 +47,26 @@ fn what_is_not_finite_is_left_out_and_told() {
     let painted = compared(&mut window, |picture| picture.rgb.fill([0.0; 3]));
     assert!(painted.figures.is_some_and(|figures| figures.relative_mean_difference.is_none()));
     assert!(!window.shows(" %"));
+}
+
+#[test]
+fn what_is_shown_is_named() {
+    let mut window = Window::with_picture();
+    let shown = |window: &Window| {
+        let node = window.harness.get_by_role_and_label(Role::ComboBox, "Show");
+        (node.value().unwrap_or_default(), node.accesskit_node().is_disabled())
+    };
+    window.viewer().wanted.painting.view = View::Albedo;
+    compared(&mut window, |_| {});
+    assert_eq!(shown(&window), ("FLIP".to_owned(), true));
+    window.press(Modifiers::NONE, Key::V);
+    assert!(window.shows("A difference is shown in the place of a view"));
+    assert_eq!(window.viewer().wanted.painting.view, View::Albedo);
+    // Beside the reference the view is seen, and alone.
+    for comparison in [Comparison::Wipe, Comparison::Off] {
+        window.viewer().wanted.painting.comparison = comparison;
+        window.wait("view", |viewer| viewer.picture.painted().is_some_and(|p| p.painting.comparison == comparison));
+        window.steps(2);
+        assert_eq!(shown(&window), ("Albedo".to_owned(), false));
+    }
 }
