@@ -13,7 +13,7 @@ const HAND: &[(&str, &str)] = &[
     ("Right drag", "look about"),
     ("W A S D", "fly; with W A S D or the right button held also Q, E: down, up"),
     ("Shift, Ctrl", "fly four times as fast, a quarter as fast"),
-    ("Click", "select the object under the cursor"),
+    ("Click", "select the material under the cursor"),
     ("Double click", "put it in focus, and turn about it"),
     ("Ctrl + wheel", "zoom into the picture; values appear in the pixels"),
     ("Ctrl + left drag", "shift the zoomed picture"),

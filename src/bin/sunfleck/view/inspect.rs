@@ -375,7 +375,7 @@ fn selection(ui: &mut egui::Ui, viewer: &mut Viewer) {
     let name = viewer.opened().zip(viewer.selected).map(|(opened, index)| material(&opened.loaded.scene, index));
     match name {
         None => {
-            ui.weak("Click on the picture to select")
+            ui.weak("Click on the picture to select a material")
                 .on_hover_text("A double click puts it in focus, to turn about it");
         }
         Some(name) => {
@@ -383,7 +383,7 @@ fn selection(ui: &mut egui::Ui, viewer: &mut Viewer) {
                 if ui.small_button("Deselect").on_hover_text("Escape").clicked() {
                     viewer.selected = None;
                 }
-                ui.add(egui::Label::new(format!("Selected: {name}")).truncate());
+                ui.add(egui::Label::new(format!("Selected material: {name}")).truncate());
             });
         }
     }

@@ -70,7 +70,7 @@ pub const SHORTCUTS: &[Shortcut] = &[
     key(Key::F3, "convergence, shown or hidden", |_, v| v.remembered.show_convergence ^= true),
     key(Key::F12, "save a picture of the window", |ui, v| files::screenshot(ui, v)),
     key(Key::Questionmark, "this help", |_, v| v.show_help ^= true),
-    key(Key::Escape, "close the help, else select nothing", |_, v| match v.show_help {
+    key(Key::Escape, "close the help, else select no material", |_, v| match v.show_help {
         true => v.show_help = false,
         false => v.selected = None,
     }),

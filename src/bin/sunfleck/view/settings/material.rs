@@ -12,7 +12,7 @@ use super::scene::tidy;
 use super::widgets::{Name, row};
 use crate::view::app::Viewer;
 
-const MATERIAL: Name = Name { name: "Material", hint: "Click on an object in the picture, or choose here." };
+const MATERIAL: Name = Name { name: "Material", hint: "Click on a surface in the picture, or choose here." };
 const BASE_COLOR: Name =
     Name { name: "Base colour", hint: "Linear RGB from 0 to 1; a texture multiplies it. Restarts the estimate." };
 const ROUGHNESS: Name =
@@ -59,7 +59,7 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     });
     viewer.selected = picked.or(viewer.selected);
     let Some(index) = viewer.selected else {
-        ui.weak("Click on an object in the picture.");
+        ui.weak("Click on a surface in the picture.");
         return;
     };
     match scene.materials.get(index) {

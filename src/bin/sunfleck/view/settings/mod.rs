@@ -24,7 +24,7 @@ const GROUPS: [(&str, &str, bool, Group); 6] = [
     ("Picture", "Its size, and how it is shown", true, look::show),
     ("Camera", "What the picture is taken with", true, camera::show),
     ("Environment", "Light from infinitely far away", false, scene::environment),
-    ("Selected object", "The material of what was clicked on in the picture", true, material::show),
+    ("Selected material", "Of the surface that was clicked on in the picture", true, material::show),
     ("Lights", "The strength of all lights, and the lamps without extent", false, scene::lights),
 ];
 

@@ -398,6 +398,10 @@ fn what_is_under_the_cursor_is_told_and_selected() {
         window.step();
     }
     window.wait("selection", |viewer| viewer.selected.is_some());
+    window.steps(2);
+    let selected = window.viewer().selected.unwrap();
+    let name = window.viewer().opened().unwrap().loaded.scene.materials[selected].name.clone();
+    assert!(window.shows(&format!("Selected material: {name}")) && !window.shows("object in the picture"));
 }
 
 #[test]
