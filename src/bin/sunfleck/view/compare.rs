@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use eframe::egui;
-use egui::{Color32, Key, PointerButton, Rect, Stroke, pos2};
+use egui::{Color32, Key, PointerButton, Rect, Response, Stroke, pos2};
 use sunfleck::output;
 use sunfleck::output::difference::Measure;
 use sunfleck::output::tonemap::ToneMap;
@@ -23,6 +23,8 @@ const HOLD: f32 = 6.0;
 pub struct CompareView {
     /// Where the line is, share of the picture's width.
     wipe: f32,
+    /// What the line is held by, as it was last drawn.
+    hold: Option<Rect>,
     texture: Option<(Made, egui::TextureHandle)>,
     /// The reference that was last looked at.
     seen: Option<Arc<Reference>>,
@@ -30,7 +32,7 @@ pub struct CompareView {
 
 impl Default for CompareView {
     fn default() -> Self {
-        Self { wipe: 0.5, texture: None, seen: None }
+        Self { wipe: 0.5, hold: None, texture: None, seen: None }
     }
 }
 
@@ -214,15 +216,33 @@ pub fn section(ui: &mut egui::Ui, viewer: &mut Viewer) {
     });
 }
 
-/// Over the picture at `rect`; right of which place, points, the reference is seen.
-pub fn overlay(ui: &egui::Ui, viewer: &mut Viewer, painter: &egui::Painter, rect: Rect) -> Option<f32> {
+/// The line of the wipe, if there is one. Only the left button moves it; drags with another are for the camera.
+pub fn handle(ui: &egui::Ui, viewer: &Viewer) -> Option<Response> {
+    let response = ui.interact(viewer.compare.hold?, egui::Id::unique("wipe"), egui::Sense::drag());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Wipe"));
+    Some(response)
+}
+
+/// Over the picture at `rect`; right of which place, points, the reference is seen. `handle` is that of the line.
+pub fn overlay(
+    ui: &egui::Ui,
+    viewer: &mut Viewer,
+    painter: &egui::Painter,
+    rect: Rect,
+    handle: Option<&Response>,
+) -> Option<f32> {
+    let held_before = viewer.compare.hold.take();
+    if handle.is_some_and(Response::dragged) {
+        // The camera is turned by it, and its previews have no line.
+        viewer.compare.hold = held_before;
+    }
     let painted = viewer.picture.painted().cloned()?;
     let (reference, _) = painted.reference.as_ref()?;
     let (size, rgba) = painted.reference_texture()?;
     let visible = rect.intersect(painter.clip_rect());
-    let is_held = is_asked_for(ui, &viewer.keyboard, visible);
+    let is_asked = is_asked_for(ui, &viewer.keyboard, visible);
     let is_wiped = painted.painting.comparison == Comparison::Wipe;
-    if !(is_held || is_wiped) || !visible.is_positive() {
+    if !(is_asked || is_wiped) || !visible.is_positive() {
         return None;
     }
     let view = &mut viewer.compare;
@@ -233,19 +253,23 @@ pub fn overlay(ui: &egui::Ui, viewer: &mut Viewer, painter: &egui::Painter, rect
         view.texture = Some((made, ui.ctx().load_texture("reference", image, options)));
     }
     let (_, texture) = view.texture.as_ref()?;
-    if is_held {
+    if is_asked {
         painter.image(texture.id(), rect, uv(0.0), Color32::WHITE);
         name(painter, visible.left_top(), egui::Align2::LEFT_TOP, &reference.name);
         return Some(f32::NEG_INFINITY);
     }
     let (x, from) = line(view.wipe, rect, visible);
     let hold = Rect::from_x_y_ranges(x - HOLD..=x + HOLD, visible.y_range());
-    let response = ui.interact(hold, egui::Id::unique("wipe"), egui::Sense::drag());
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Wipe"));
+    view.hold = Some(hold);
+    if view.hold != held_before {
+        // Which takes the pointer from the next frame on.
+        ui.ctx().request_repaint();
+    }
+    let is_held = handle.is_some_and(|handle| handle.dragged_by(PointerButton::Primary));
+    let is_marked = is_held || handle.is_some_and(|handle| handle.hovered() && !handle.dragged());
     let right = Rect::from_min_max(pos2(x, rect.top()), rect.max);
     painter.image(texture.id(), right, uv(from), Color32::WHITE);
-    let (width, color) =
-        if response.hovered() || response.dragged() { (2.5, Color32::WHITE) } else { (1.5, Color32::LIGHT_GRAY) };
+    let (width, color) = if is_marked { (2.5, Color32::WHITE) } else { (1.5, Color32::LIGHT_GRAY) };
     painter.vline(x + 1.0, visible.y_range(), Stroke::new(width + 1.0, Color32::from_black_alpha(140)));
     painter.vline(x, visible.y_range(), Stroke::new(width, color));
     let left = match painted.painting.view {
@@ -254,10 +278,10 @@ pub fn overlay(ui: &egui::Ui, viewer: &mut Viewer, painter: &egui::Painter, rect
     };
     name(painter, pos2(x - HOLD, visible.top()), egui::Align2::RIGHT_TOP, left);
     name(painter, pos2(x + HOLD, visible.top()), egui::Align2::LEFT_TOP, &reference.name);
-    if response.hovered() || response.dragged() {
+    if is_marked {
         ui.ctx().set_cursor_icon(egui::CursorIcon::ResizeHorizontal);
     }
-    if let (true, Some(pointer)) = (response.dragged_by(PointerButton::Primary), response.interact_pointer_pos()) {
+    if let (true, Some(pointer)) = (is_held, handle.and_then(Response::interact_pointer_pos)) {
         view.wipe = ((pointer.x - rect.left()) / rect.width()).clamp(0.0, 1.0);
         ui.ctx().request_repaint();
     }

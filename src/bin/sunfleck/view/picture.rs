@@ -111,7 +111,12 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
     if let Some(painted) = viewer.now.painted.clone() {
         viewer.picture.take(ui.ctx(), &painted);
     }
-    move_camera(ui, viewer, area, &response);
+    let line = super::compare::handle(ui, viewer);
+    let hand = match line.clone().filter(|line| line.dragged() && !line.dragged_by(PointerButton::Primary)) {
+        Some(line) => response.clone() | line,
+        None => response.clone(),
+    };
+    move_camera(ui, viewer, area, &hand);
     super::failure::show(ui, viewer, area);
     let Some(painted) = viewer.picture.painted.clone() else {
         waiting(ui, viewer, area);
@@ -128,7 +133,7 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
         let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
         painter.image(texture.id(), rect, uv, egui::Color32::WHITE);
     }
-    let reference_from = super::compare::overlay(ui, viewer, &painter, rect);
+    let reference_from = super::compare::overlay(ui, viewer, &painter, rect, line.as_ref());
     // Beside the reference's line too, which takes the pointer for itself.
     let pointer = ui.input(|i| i.pointer.latest_pos()).filter(|p| response.contains_pointer() && area.contains(*p));
     let at = pointer.and_then(|p| on_film(rect, painted.size, p));

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use eframe::egui;
-use egui::{Key, Modifiers, Role};
+use egui::{Event, Key, Modifiers, PointerButton, Role};
 use egui_kittest::kittest::{NodeT, Queryable};
 use sunfleck::output::Picture;
 use sunfleck::output::false_colour::NOT_FINITE;
@@ -47,6 +47,47 @@ fn what_is_not_finite_is_left_out_and_told() {
     let painted = compared(&mut window, |picture| picture.rgb.fill([0.0; 3]));
     assert!(painted.figures.is_some_and(|figures| figures.relative_mean_difference.is_none()));
     assert!(!window.shows(" %"));
+}
+
+/// Only the left button is for the line of the wipe.
+#[test]
+fn the_camera_turns_on_the_line_as_beside_it() {
+    let mut window = Window::with_picture();
+    compared(&mut window, |_| {});
+    window.viewer().wanted.painting.comparison = Comparison::Wipe;
+    window.wait("wipe", |viewer| {
+        viewer.picture.painted().is_some_and(|painted| painted.painting.comparison == Comparison::Wipe)
+    });
+    window.steps(3);
+    let line = |window: &Window| window.harness.get_by_role_and_label(Role::Slider, "Wipe").rect().center();
+    for button in [PointerButton::Middle, PointerButton::Secondary, PointerButton::Primary] {
+        let (before, at) = (window.viewer().edits.now().camera.clone(), line(&window));
+        let press = |pos, pressed| Event::PointerButton { pos, button, pressed, modifiers: Modifiers::NONE };
+        window.harness.input_mut().events.extend([Event::PointerMoved(at), press(at, true)]);
+        window.steps(2);
+        for i in 1..=10 {
+            window.harness.input_mut().events.push(Event::PointerMoved(at + egui::vec2(6.0, 2.0) * i as f32));
+            window.step();
+        }
+        if button != PointerButton::Primary {
+            window.wait("preview", |viewer| viewer.picture.painted().is_some_and(|painted| painted.frame.is_preview));
+        }
+        let way = window.viewer().edits.now().camera.clone();
+        window.step();
+        let to = at + egui::vec2(66.0, 22.0);
+        window.harness.input_mut().events.push(Event::PointerMoved(to));
+        window.step();
+        assert_eq!(window.viewer().edits.now().camera == way, button == PointerButton::Primary, "{button:?}");
+        window.harness.input_mut().events.push(press(to, false));
+        window.steps(3);
+        let is_line = button == PointerButton::Primary;
+        assert_eq!(window.viewer().edits.now().camera == before, is_line, "{button:?}");
+        // Previews have none.
+        window.steps(30);
+        window.wait_for_picture();
+        window.steps(3);
+        assert!((line(&window).x - at.x - if is_line { 66.0 } else { 0.0 }).abs() < 1.0, "{button:?}");
+    }
 }
 
 #[test]
