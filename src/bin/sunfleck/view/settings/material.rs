@@ -33,8 +33,13 @@ const IOR: Name = Name {
     name: "Refraction",
     hint: "Index of refraction: water 1.33, glass 1.5, diamond 2.4. Restarts the estimate.",
 };
-const EMISSION: Name =
-    Name { name: "Emission", hint: "Factor on the light that the surface gives by itself. Restarts the estimate." };
+const EMISSION: Name = Name {
+    name: "Emission",
+    hint: "Radiance that the surface gives by itself, linear RGB of any size ≥ 0; a texture multiplies it. Restarts the \
+           estimate.",
+};
+const EMISSION_FACTOR: Name =
+    Name { name: "Emission ×", hint: "Factor on the light that the surface gives by itself. Restarts the estimate." };
 
 pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     let Some(opened) = viewer.opened().cloned() else { return };
@@ -79,6 +84,9 @@ struct Property {
     idle: Option<&'static str>,
 }
 
+/// Where settings have a colour of a material.
+type ColorField = fn(&mut MaterialSettings) -> &mut Option<[f32; 3]>;
+
 /// Why roughness, transmission, specular and index of refraction would change nothing of a material as it stands now.
 fn idle(own: &Material, now: &MaterialSettings) -> [Option<&'static str>; 4] {
     let metallic = now.metallic.unwrap_or(own.metallic);
@@ -98,44 +106,34 @@ fn idle(own: &Material, now: &MaterialSettings) -> [Option<&'static str>; 4] {
 fn properties(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, index: usize, own: &Material) {
     let was = read.clone().material_mut(scene, index).clone();
     let before = viewer.settings().as_ref().clone().material_mut(scene, index).clone();
-    let mut base = before.base_color.unwrap_or(own.base_color.to_array());
-    let mut changed = false;
-    let reset = row(ui, BASE_COLOR, before.base_color != was.base_color, |ui| {
-        let response = color(ui, BASE_COLOR.name, &mut base, Some(1.0));
-        changed = response.changed();
-        response
-    });
-    if changed {
-        let base = base.map(|c| c.clamp(0.0, 1.0));
-        viewer.edit(ui, "base colour", |s| s.material_mut(scene, index).base_color = Some(base));
-    }
-    if reset {
-        viewer.reset(ui, |s| {
-            s.material_mut(scene, index).base_color = was.base_color;
-            tidy(s, read);
+    let color_row = |ui: &mut Ui, viewer: &mut Viewer, name: Name, field: ColorField, own: Vec3, most: f32| {
+        let (value, old) = (*field(&mut before.clone()), *field(&mut was.clone()));
+        let mut shown = value.unwrap_or(own.to_array());
+        let mut changed = false;
+        let reset = row(ui, name, value != old, |ui| {
+            let response = color(ui, name.name, &mut shown, Some(most));
+            changed = response.changed();
+            response
         });
-    }
-    let unit = |name, field, own| Property { name, field, own, range: [0.0, 1.0], idle: None };
-    let [rough, through, shiny, bent] = idle(own, &before);
-    let properties = [
-        Property { idle: rough, ..unit(ROUGHNESS, |m| &mut m.roughness, own.roughness) },
-        unit(METALLIC, |m| &mut m.metallic, own.metallic),
-        Property { idle: through, ..unit(TRANSMISSION, |m| &mut m.transmission, own.transmission) },
-        Property { idle: shiny, ..unit(SPECULAR, |m| &mut m.specular, own.specular) },
-        Property { range: [1.0, 2.5], idle: bent, ..unit(IOR, |m| &mut m.ior, own.ior) },
-        Property { range: [0.0, 1000.0], ..unit(EMISSION, |m| &mut m.emission_strength, 1.0) },
-    ];
-    let shines = before.emission.map_or(own.emission, Vec3::from) != Vec3::ZERO;
-    for Property { name, field, own, range: [low, high], idle } in properties {
-        let is_emission = name.name == EMISSION.name;
-        if is_emission && !shines {
-            continue;
+        if changed {
+            let shown = shown.map(|c| c.clamp(0.0, most));
+            viewer.edit(ui, name.name, |s| *field(s.material_mut(scene, index)) = Some(shown));
         }
+        if reset {
+            viewer.reset(ui, |s| {
+                *field(s.material_mut(scene, index)) = old;
+                tidy(s, read);
+            });
+        }
+    };
+    let number_row = |ui: &mut Ui, viewer: &mut Viewer, property: Property| {
+        let Property { name, field, own, range: [low, high], idle } = property;
+        let is_factor = name.name == EMISSION_FACTOR.name;
         let (value, old) = (*field(&mut before.clone()), *field(&mut was.clone()));
         let mut shown = f64::from(value.unwrap_or(own));
         let mut changed = false;
         let reset = row(ui, name, value != old, |ui| {
-            let slide = if is_emission { log_slider } else { slider };
+            let slide = if is_factor { log_slider } else { slider };
             let control = |ui: &mut Ui| slide(ui, &mut shown, Number::Plain, low..=high);
             let response = ui.add_enabled_ui(idle.is_none(), control).inner;
             changed = response.changed();
@@ -144,7 +142,7 @@ fn properties(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, 
         if changed {
             let value = match name.name {
                 "Refraction" => (shown as f32).max(0.01),
-                "Emission" => (shown as f32).max(0.0),
+                _ if is_factor => (shown as f32).max(0.0),
                 _ => (shown as f32).clamp(0.0, 1.0),
             };
             viewer.edit(ui, name.name, |s| *field(s.material_mut(scene, index)) = Some(value));
@@ -155,6 +153,23 @@ fn properties(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, 
                 tidy(s, read);
             });
         }
+    };
+    color_row(ui, viewer, BASE_COLOR, |m| &mut m.base_color, own.base_color, 1.0);
+    let unit = |name, field, own| Property { name, field, own, range: [0.0, 1.0], idle: None };
+    let [rough, through, shiny, bent] = idle(own, &before);
+    for property in [
+        Property { idle: rough, ..unit(ROUGHNESS, |m| &mut m.roughness, own.roughness) },
+        unit(METALLIC, |m| &mut m.metallic, own.metallic),
+        Property { idle: through, ..unit(TRANSMISSION, |m| &mut m.transmission, own.transmission) },
+        Property { idle: shiny, ..unit(SPECULAR, |m| &mut m.specular, own.specular) },
+        Property { range: [1.0, 2.5], idle: bent, ..unit(IOR, |m| &mut m.ior, own.ior) },
+    ] {
+        number_row(ui, viewer, property);
+    }
+    color_row(ui, viewer, EMISSION, |m| &mut m.emission, own.emission, f32::MAX);
+    if before.emission.map_or(own.emission, Vec3::from) != Vec3::ZERO {
+        let factor = unit(EMISSION_FACTOR, |m| &mut m.emission_strength, 1.0);
+        number_row(ui, viewer, Property { range: [0.0, 1000.0], ..factor });
     }
 }
 

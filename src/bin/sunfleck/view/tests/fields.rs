@@ -288,6 +288,30 @@ fn what_changes_nothing_restarts_nothing() {
 }
 
 #[test]
+fn any_material_can_be_made_to_shine() {
+    let mut window = panel(|_| {});
+    let scene = window.viewer().opened().unwrap().loaded.scene.clone();
+    assert_eq!(scene.materials[0].emission, glam::Vec3::ZERO);
+    assert!(!window.shows("Emission ×"));
+    window.harness.get_by_role_and_label(Role::ColorWell, "Emission").click_accesskit();
+    window.steps(5);
+    window.harness.get_by_role_and_label(Role::SpinButton, "G").focus();
+    end(&mut window, "12.5", Some(Key::Enter));
+    window.press(Modifiers::NONE, Key::Escape);
+    assert_eq!(window.viewer().edits.now().materials[0].emission, Some([0.0, 12.5, 0.0]));
+    enter(&mut window, "Emission ×", 0, "2");
+    assert_eq!(window.viewer().edits.now().materials[0].emission_strength, Some(2.0));
+    window.wait_for_picture();
+    let frame = window.viewer().now.frame.clone().unwrap();
+    let green = |rgb: &[f32; 3]| rgb[1] > 5.0 * rgb[0].max(rgb[2]);
+    assert!(frame.picture().rgb.iter().filter(|rgb| green(rgb)).count() > 32);
+    for name in ["Reset emission ×", "Reset emission"] {
+        window.activate(name);
+    }
+    assert!(window.viewer().edits.now().materials.is_empty() && !window.shows("Emission ×"));
+}
+
+#[test]
 fn the_hint_of_the_hues_leaves_the_numbers_in_sight() {
     let mut window = panel(|_| {});
     window.harness.get_by_role_and_label(Role::ColorWell, "Base colour").click_accesskit();
