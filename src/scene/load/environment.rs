@@ -27,7 +27,7 @@ const MAX_RADIANCE: f32 = 1e20;
 /// Reads a `.hdr` or `.exr` file, told apart by content; with it come warnings for the user.
 ///
 /// An `.exr` has `R`, `G` and `B`, plain or of a layer, as in `Combined.R`, or `Y` as grey. Its map is the data window, in
-/// whatever display window.
+/// whatever display window, as OpenEXR's own `LatLongMap` has it.
 ///
 /// Larger maps are averaged down to 2048 × 1024, weighted by solid angle, so that the light they bring stays the same.
 pub fn load_environment(path: &Path) -> Result<(Environment, Vec<String>), LoadError> {
