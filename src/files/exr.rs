@@ -150,6 +150,7 @@ fn block_bytes(header: &Header) -> Option<usize> {
 /// What the decoder says, or that it panicked.
 fn caught<T>(work: impl FnOnce() -> Result<T, Problem>) -> Result<T, String> {
     match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(Err(Problem::Invalid(what))) => Err(format!("the file is cut off or damaged: {what}")),
         Ok(result) => result.map_err(|e| e.to_string()),
         Err(_) => Err("the OpenEXR data are damaged".into()),
     }

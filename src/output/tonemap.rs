@@ -80,26 +80,26 @@ pub fn srgb_encode(linear: f32) -> f32 {
 /// is bright (Reinhard 2002, "Parameter estimation for photographic tone reproduction"). So a dim background does not burn
 /// out what stands before it.
 ///
-/// All are of lit pixels, those brighter than 2⁻¹² of the 98th percentile of what is above 0, with everything above that
-/// percentile, and below the 2nd, cut off there: neither a black background nor a few fireflies nor a lamp in view move it.
-/// A black picture gets 0.
+/// It is measured in the logarithms of lit pixels, those brighter than 2⁻¹² of the 98th percentile of what is above 0. Of
+/// these the darkest and the brightest 2 % are left out, and the next 8 % on average are the darkest and the brightest:
+/// neither a black background nor a few fireflies move it, and a lamp that comes into view does little by little. A black
+/// picture gets 0.
 pub fn automatic_exposure(rgb: &[[f32; 3]]) -> f32 {
-    let percentile = |values: &mut [f32], n: usize| {
-        let at = (values.len() - 1) * n / 100;
-        *values.select_nth_unstable_by(at, f32::total_cmp).1
-    };
     let mut lit: Vec<f32> = rgb.iter().map(|&c| luminance(c)).filter(|y| *y > 0.0 && y.is_finite()).collect();
     if lit.is_empty() {
         return 0.0;
     }
-    let bright = percentile(&mut lit, 98);
-    lit.retain(|&y| y > bright / 4096.0);
-    let dark = percentile(&mut lit, 2);
-    let stops = |y: f32| f64::from(y.clamp(dark, bright)).log2();
-    let mean = lit.iter().map(|&y| stops(y)).sum::<f64>() / lit.len() as f64;
-    let [low, high] = [stops(dark), stops(bright)];
-    let f = if high > low { (2.0 * mean - low - high) / (high - low) } else { 0.0 };
-    (0.18f64.log2() + 2.0 * f - mean).clamp(-60.0, 60.0) as f32
+    lit.sort_unstable_by(f32::total_cmp);
+    let dimmest = lit[(lit.len() - 1) * 98 / 100] / 4096.0;
+    let lit = &lit[lit.partition_point(|&y| y <= dimmest)..];
+    let mean = |from: usize, to: usize| {
+        let first = (lit.len() * from / 100).min(lit.len() - 1);
+        let part = &lit[first..(lit.len() * to / 100).max(first + 1)];
+        part.iter().map(|&y| f64::from(y).log2()).sum::<f64>() / part.len() as f64
+    };
+    let [low, middle, high] = [mean(2, 10), mean(2, 98), mean(90, 98)];
+    let f = if high > low { (2.0 * middle - low - high) / (high - low) } else { 0.0 };
+    (0.18f64.log2() + 2.0 * f - middle).clamp(-60.0, 60.0) as f32
 }
 
 #[cfg(test)]
@@ -173,10 +173,20 @@ mod tests {
         noisy.extend([[1e-6; 3]; 1000]);
         noisy.extend([[1e6; 3], [f32::INFINITY; 3], [f32::NAN; 3]]);
         assert!((automatic_exposure(&noisy) + 1.0).abs() < 1e-2, "{}", automatic_exposure(&noisy));
-        // A dim background three stops below the subject: the mean is a sixteenth of the way up, f = −7/8.
-        let mut subject = vec![[0.125; 3]; 15 * 64];
-        subject.extend([[1.0; 3]; 64]);
-        assert!((automatic_exposure(&subject) - (0.18f32.log2() - 1.75 + 3.0 * 15.0 / 16.0)).abs() < 1e-5);
+        // A dim background three stops below the subject: of 960 pixels that count, 880 are dim, and f = −5/6.
+        let mut subject = vec![[0.125; 3]; 900];
+        subject.extend([[1.0; 3]; 100]);
+        let expected = 0.18f32.log2() - 2.0 * 5.0 / 6.0 + 3.0 * 880.0 / 960.0;
+        assert!((automatic_exposure(&subject) - expected).abs() < 1e-5);
+        // A lamp eight stops above the rest comes into view.
+        let mut last = 0.0;
+        for n in 0..100 {
+            let mut room: Vec<_> = (0..1000 - n).map(|i| [(i as f32 / 500.0).exp2(); 3]).collect();
+            room.extend(vec![[512.0; 3]; n]);
+            let exposure = automatic_exposure(&room);
+            assert!(n == 0 || (exposure - last).abs() < 0.25, "{n}: {last} {exposure}");
+            last = exposure;
+        }
         assert_eq!(automatic_exposure(&[]), 0.0);
         assert_eq!(automatic_exposure(&[[0.0; 3]; 4]), 0.0);
     }

@@ -7,7 +7,6 @@ use sunfleck::layout::EyeVertex;
 use sunfleck::output::atomic;
 use sunfleck::output::png::Look;
 use sunfleck::ppm::{Direct, FirstRadius, Kernel, Params};
-use sunfleck::scene::defaults::{add_default_light, has_light};
 use sunfleck::scene::load::Loaded;
 use sunfleck::scene::{Camera, Scene, Settings, settings};
 
@@ -100,14 +99,7 @@ impl Job {
 ///
 /// `source` says where the scene came from; its own settings are not looked at.
 pub fn prepare(source: &Source, settings: &Settings, mut loaded: Loaded, args: &InputArgs) -> Result<Input> {
-    // A sky is for a scene that comes without light: one whose lights are turned off, or dimmed to nothing, is black. The
-    // sky is a light as others are, so that all are scaled at the end.
-    let is_dark = !has_light(&loaded.scene);
-    source.apply(&Settings { light_scale: None, ..settings.clone() }, &mut loaded)?;
-    if is_dark {
-        loaded.warnings.extend(add_default_light(&mut loaded.scene));
-    }
-    source.apply(&Settings { light_scale: settings.light_scale, ..Settings::default() }, &mut loaded)?;
+    source.apply(settings, &mut loaded)?;
     let Loaded { scene, warnings } = loaded;
     scene.check().with_context(|| source.name.clone())?;
     let camera = scene.cameras[0].clone();

@@ -15,7 +15,9 @@ mod stop;
 #[cfg(feature = "view")]
 mod view;
 
+use std::io::{self, Write};
 use std::process::ExitCode;
+use std::sync::OnceLock;
 
 use cli::{Cli, Command};
 
@@ -53,6 +55,10 @@ fn main() -> ExitCode {
             return ExitCode::from(cli::USAGE);
         }
     };
+    let done = done.and_then(|code| match UNPRINTED.get() {
+        Some(error) => Err(anyhow::anyhow!("standard output: {error}")),
+        None => Ok(code),
+    });
     done.unwrap_or_else(|error| {
         let usage = error.is::<cli::Usage>();
         say_error(&chain(&error));
@@ -90,10 +96,15 @@ fn one_line(message: &str) -> String {
     message.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
+/// Why something could not be printed, the first time; told at the end, for what is done may go to files as well.
+static UNPRINTED: OnceLock<io::Error> = OnceLock::new();
+
 /// To standard output; a reader that has gone away (`| head`) is no error.
 fn print(text: &str) {
-    use std::io::Write;
-    let _ = writeln!(std::io::stdout(), "{text}");
+    match writeln!(io::stdout(), "{text}") {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => _ = UNPRINTED.set(error),
+        _ => {}
+    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Pictures of any program: which of a file's pixels are the picture.
 
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufReader, ErrorKind, Read};
 use std::path::Path;
 
 use ::exr::meta::header::Header;
@@ -55,8 +55,10 @@ fn open(path: &Path) -> Result<Image<BufReader<File>>, Error> {
     }
     let mut file = BufReader::new(File::open(path).map_err(|e| fail(&e))?);
     let mut begin = [0; MAGIC.len()];
-    if file.read_exact(&mut begin).is_ok() && begin != MAGIC {
-        return Err(fail(&"not an OpenEXR file"));
+    match file.read_exact(&mut begin) {
+        Err(e) if e.kind() != ErrorKind::UnexpectedEof => return Err(fail(&e)),
+        Ok(()) if begin == MAGIC => {}
+        _ => return Err(fail(&"not an OpenEXR file")),
     }
     Image::open(file, &LIMITS).map_err(|e| fail(&e))
 }

@@ -94,7 +94,13 @@ impl<'a> Room<'a> {
         let looks: Vec<_> = cameras.par_iter().map(|camera| self.look(camera)).collect();
         let is_lit = |look: &Look| look.n_lit as f32 >= LEAST_LIT * N_RAYS as f32;
         let views = cameras.into_iter().zip(looks).filter(|(_, look)| is_lit(look));
-        views.max_by(|(_, a), (_, b)| a.score().total_cmp(&b.score())).map(|(camera, _)| camera)
+        let (mut camera, _) = views.max_by(|(_, a), (_, b)| a.score().total_cmp(&b.score()))?;
+        // What is turned about lies half-way to what is ahead at most: the room goes on as far behind it.
+        let m = &camera.world_from_camera;
+        let (eye, forward) = (Vec3::from(m.translation), -Vec3::from(m.matrix3.z_axis));
+        let ahead = self.seen(eye, forward).map_or(f32::INFINITY, |(_, seen)| eye.distance(seen.p));
+        camera.focus_distance = camera.focus_distance.min(0.5 * ahead);
+        Some(camera)
     }
 
     fn look(&self, camera: &Camera) -> Look {

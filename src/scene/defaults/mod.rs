@@ -13,17 +13,14 @@ use std::sync::Arc;
 /// Texels of the default sky's height; its width is twice that.
 const SKY_HEIGHT: u32 = 128;
 
-/// Gives a scene in which nothing shines a soft sky, and says so; a scene with any light is left alone.
-pub fn add_default_light(scene: &mut Scene) -> Option<String> {
-    if has_light(scene) {
-        return None;
-    }
+/// Gives a scene in which nothing shines ([`has_light`]) a soft sky, and says so.
+pub fn add_default_light(scene: &mut Scene) -> String {
     let warning = match used_materials(scene).any(|material| material.emission != Vec3::ZERO) {
         true => "nothing in the scene gives light but painted glow: a soft sky is added",
         false => "nothing in the scene gives light: a soft sky is added",
     };
     scene.environment = Some(default_sky());
-    Some(warning.into())
+    warning.into()
 }
 
 /// Whether a lamp is in use, or there is a light or an environment, however dim.
@@ -33,7 +30,7 @@ pub fn has_light(scene: &Scene) -> bool {
 
 /// An emission texture of strength 1 at most is no lamp: it paints the displays and status lights of a model that is
 /// meant to be lit by something else.
-fn is_lamp(material: &Material) -> bool {
+pub(super) fn is_lamp(material: &Material) -> bool {
     material.emission != Vec3::ZERO && (material.emission_texture.is_none() || material.emission.max_element() > 1.0)
 }
 
@@ -82,15 +79,15 @@ mod tests {
         let mut dark = Scene { meshes: vec![mesh], materials, ..Scene::default() };
         let mut lit = dark.clone();
         lit.meshes[0].material = 1;
-        assert!(add_default_light(&mut lit).is_none() && lit.environment.is_none());
+        assert!(has_light(&lit));
         // A glowing display is no lamp, unless it is brighter than what a texture can hold.
         let mut display = lit.clone();
         display.materials[1].emission_texture = Some(Texture::new(0));
         assert!(!has_light(&display));
         display.materials[1].emission *= 2.0;
         assert!(has_light(&display));
-        assert!(add_default_light(&mut dark).is_some());
+        assert!(!has_light(&dark) && add_default_light(&mut dark).contains("sky"));
         assert_eq!(dark.check(), Ok(()));
-        assert!(add_default_light(&mut dark).is_none());
+        assert!(has_light(&dark));
     }
 }

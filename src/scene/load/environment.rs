@@ -49,6 +49,13 @@ pub fn load_environment(path: &Path) -> Result<(Environment, Vec<String>), LoadE
             map.n_invalid
         ));
     }
+    let (n_columns, n_rows) = (map.columns.len(), map.rows.len());
+    if n_columns * n_rows > 1 && n_columns.abs_diff(2 * n_rows) * 50 > n_columns {
+        warnings.push(format!(
+            "{}: {n_columns} × {n_rows} texels are stretched over the sphere: a map of all directions is twice as wide as high",
+            path.display()
+        ));
+    }
     let [width, height] = map.size.map(|n| n as u32);
     Ok((Environment { width, height, texels: map.texels.into(), rotation: 0.0, strength: 1.0 }, warnings))
 }

@@ -119,7 +119,10 @@ pub fn load(path: &Path) -> Result<Loaded, LoadError> {
     if !matches!(extension.as_str(), "gltf" | "glb" | "obj") {
         // Say "no such file" before "unknown extension".
         files::check_regular(path).map_err(|problem| LoadError::Unreadable { file: path.into(), problem })?;
-        let problem = format!("the extension {extension:?} is none of .gltf, .glb and .obj (settings: .toml)");
+        let problem = match extension.as_str() {
+            "toml" => "is a settings file, where a scene is asked for: .gltf, .glb or .obj".into(),
+            _ => format!("the extension {extension:?} is none of .gltf, .glb and .obj (settings: .toml)"),
+        };
         return Err(LoadError::Format { file: path.into(), problem });
     }
     let (source, bytes) = Source::open(path)?;

@@ -7,7 +7,7 @@ use super::{
 use crate::scene::load::load_environment;
 use crate::scene::{
     Camera, Environment, Material, Projection, PunctualKind, PunctualLight, Scene, Sphere,
-    defaults::{add_default_light, default_camera, has_light},
+    defaults::{add_default_light, default_camera, has_light, is_lamp},
 };
 use glam::{Affine3A, Vec3};
 use std::path::Path;
@@ -109,7 +109,8 @@ impl Settings {
     }
 
     /// Changes and adds to a scene, in this order, as the settings say; the first camera is then the one to use. A scene
-    /// without a camera gets the default one ([`Settings::add_default_camera`]).
+    /// without a camera gets the default one ([`Settings::add_default_camera`]), and one without light a sky
+    /// ([`Settings::needs_sky`]).
     ///
     /// `folder` is where the settings file lies. Returns warnings.
     pub fn apply_to_scene(&self, scene: &mut Scene, folder: &Path) -> Result<Vec<String>, SettingsError> {
@@ -126,8 +127,10 @@ impl Settings {
         let wrong = |(field, problem): Wrong| SettingsError::Field { field, problem };
         self.check_values().map_err(wrong)?;
         self.add_default_camera(scene);
-        let is_dark = !has_light(scene);
         let mut warnings = Vec::new();
+        if self.needs_sky(scene) {
+            warnings.push(add_default_light(scene));
+        }
         for (i, material) in self.materials.iter().enumerate() {
             material.apply(&mut scene.materials, &format!("material[{i}]")).map_err(wrong)?;
         }
@@ -139,7 +142,7 @@ impl Settings {
         }
         scene.lights.extend(self.lights.iter().enumerate().map(|(i, light)| light.light(i)));
         if let Some(environment) = &self.environment {
-            warnings.extend(environment.apply(scene, is_dark, folder, read)?);
+            warnings.extend(environment.apply(scene, folder, read)?);
         }
         if let Some(factor) = self.light_scale {
             scale_lights(scene, factor);
@@ -170,6 +173,19 @@ impl Settings {
         if scene.cameras.is_empty() {
             scene.cameras.push(default_camera(scene, &self.added_spheres()));
         }
+    }
+
+    /// Whether a scene, as its file has it, gets a soft sky ([`add_default_light`]): it comes without light, and these
+    /// settings bring none, neither an environment nor lights nor spheres that shine. What they change of its materials and
+    /// lights does not count: one whose lights are turned off is black, and one that a material begins to light keeps its
+    /// sky.
+    pub fn needs_sky(&self, scene: &Scene) -> bool {
+        let shines = |sphere: &SphereSettings| {
+            let named = || scene.materials.iter().find(|m| Some(&m.name) == sphere.material.as_ref());
+            sphere.emission.is_some_and(|emission| emission != [0.0; 3]) || named().is_some_and(is_lamp)
+        };
+        let brings_sky = self.environment.as_ref().is_some_and(|e| e.file.is_some() || e.color.is_some());
+        !has_light(scene) && !brings_sky && self.lights.is_empty() && !self.spheres.iter().any(shines)
     }
 
     /// Where spheres are added; all of material 0.
@@ -266,11 +282,10 @@ fn orient(position: Vec3, forward: Vec3, up: Vec3) -> Affine3A {
 }
 
 impl EnvironmentSettings {
-    /// `is_dark` says that the scene's file has no light. Returns warnings.
+    /// Returns warnings.
     fn apply(
         &self,
         scene: &mut Scene,
-        is_dark: bool,
         folder: &Path,
         read: &mut ReadEnvironment<'_>,
     ) -> Result<Vec<String>, SettingsError> {
@@ -282,16 +297,10 @@ impl EnvironmentSettings {
                 environment
             }
             (None, Some(_)) => Environment::uniform(Vec3::ONE),
-            (None, None) => {
-                // The sky that a scene without light gets is its own; one whose lights are turned off gets none.
-                if is_dark {
-                    warnings.extend(add_default_light(scene));
-                }
-                scene.environment.take().ok_or_else(|| SettingsError::Field {
-                    field: "environment".into(),
-                    problem: "neither file nor color is given, and the scene has no environment of its own".into(),
-                })?
-            }
+            (None, None) => scene.environment.take().ok_or_else(|| SettingsError::Field {
+                field: "environment".into(),
+                problem: "neither file nor color is given, and the scene has no environment of its own".into(),
+            })?,
         };
         if let Some(color) = self.color.map(Vec3::from) {
             Arc::make_mut(&mut environment.texels).iter_mut().for_each(|texel| *texel *= color);

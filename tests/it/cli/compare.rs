@@ -36,6 +36,24 @@ fn what_cannot_be_told_is_not_told_as_0() {
     assert!(json["relativeMeanDifference"].is_null() && json["meanDifference"] == 0.5, "{json} {}", stderr(&output));
 }
 
+/// On a full disk; of a reader that goes away nobody hears.
+#[test]
+#[cfg(target_os = "linux")]
+fn what_cannot_be_printed_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    save(folder.path(), "a.exr", vec![[0.5; 3]; 4]);
+    for line in ["compare a.exr a.exr", "scenes"] {
+        let mut program = std::process::Command::new(super::PROGRAM);
+        program.current_dir(folder.path()).args(words(line));
+        let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+        assert_error(&program.stdout(full).output().unwrap(), 1, &["standard output: No space left on device"]);
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let output = program.stdout(writer).output().unwrap();
+        assert!(output.status.success() && output.stderr.is_empty(), "{}", stderr(&output));
+    }
+}
+
 /// 20×10 pixels, of which the file has these.
 fn save_part(folder: &Path, name: &str, at: (i32, i32), size: (usize, usize)) {
     let channel = |name| AnyChannel::new(name, FlatSamples::F32(vec![0.5; size.0 * size.1]));

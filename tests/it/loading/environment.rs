@@ -46,6 +46,7 @@ fn hdr_and_exr_are_read() {
     assert_eq!((map.width, map.height), (3, 2));
     assert_eq!(map.texels[5], Vec3::new(2.0, 1.0, 0.0));
     assert!(warnings[0].contains("2 texels") && warnings[0].contains("sky.exr"), "{warnings:?}");
+    assert!(warnings[1].contains("3 × 2 texels are stretched") && warnings.len() == 2, "{warnings:?}");
 }
 
 /// The map is the data window, wherever it is.

@@ -3,6 +3,7 @@
 use super::{Folder, Glb};
 use glam::Vec3;
 use std::f32::consts::PI;
+use std::path::Path;
 use sunfleck::scene::settings::{Count, FirstRadius, Index, Kernel, Settings, Size};
 use sunfleck::scene::{Accelerator, AlphaMode, Environment, Material, Projection, PunctualKind, Scene};
 
@@ -174,6 +175,32 @@ fn the_scenes_environment_is_changed() {
     scene.materials.push(Material::emitter("lamp", Vec3::ONE));
     scene.meshes[0].material = scene.materials.len() - 1;
     assert!(turned(&scene).unwrap_err().to_string().contains("environment: neither file nor color"));
+}
+
+/// Of a scene that comes without light: it stays when a material begins to shine, and gives way to light that is added.
+#[test]
+fn who_takes_the_place_of_the_sky() {
+    let mut scene = Glb::triangle().scene();
+    scene.materials.push(Material::emitter("lamp", Vec3::ONE));
+    let has_sky = |text: &str| {
+        let settings = Settings::parse(text, "scene.toml".as_ref()).unwrap();
+        let mut changed = scene.clone();
+        let warnings = settings.apply_to_scene(&mut changed, Path::new("")).unwrap();
+        let needs_sky = settings.needs_sky(&scene);
+        assert_eq!(warnings.iter().any(|w| w.contains("sky")), needs_sky, "{text}");
+        assert_eq!(changed.environment.is_some_and(|sky| sky.width > 8), needs_sky, "{text}");
+        needs_sky
+    };
+    let shines = "[[material]]\nname = \"default\"\nemission = [2, 2, 2]\n";
+    let sphere = "[[sphere]]\ncentre = [0, 0, 0]\nradius = 1\n";
+    for text in ["", shines, &format!("{shines}[environment]\nstrength = 2"), sphere] {
+        assert!(has_sky(text), "{text}");
+    }
+    let light = "[[light]]\nkind = \"point\"\nposition = [0, 1, 0]\nintensity = 1";
+    let [glow, named] = ["emission = [1, 1, 1]", "material = \"lamp\""].map(|line| format!("{sphere}{line}"));
+    for text in [light, &glow, &named, "[environment]\ncolor = [1, 1, 1]"] {
+        assert!(!has_sky(text), "{text}");
+    }
 }
 
 #[test]

@@ -97,6 +97,8 @@ pub struct Viewer {
     pub compare: super::compare::CompareView,
     /// Index into the scene's materials.
     pub selected: Option<usize>,
+    /// Whether something was open, when this frame began, that a click beside it closes.
+    pub had_popup: bool,
     /// Where the picture of which scene goes without asking; of the first that is opened, if none is named.
     pub saved_as: Vec<(Option<Arc<Choice>>, PathBuf)>,
     last_save: LastSave,
@@ -153,6 +155,7 @@ impl Viewer {
             reference: first.reference,
             pick: Arc::new(files::pick),
             selected: None,
+            had_popup: false,
             start: Default::default(),
             wake,
             editing: None,
@@ -301,9 +304,15 @@ impl Viewer {
         self.wanted.steps += 1;
     }
 
-    /// Moves the camera until the whole scene is in the picture.
+    /// Moves the camera until the whole scene is in the picture; in a closed room, to where it stood in the beginning.
     pub fn frame_all(&mut self, time: f64) {
-        let Some(bounds) = self.editing.as_ref().map(|opened| opened.bounds) else { return };
+        let Some((bounds, is_closed)) = self.editing.as_ref().map(|opened| (opened.bounds, opened.is_closed)) else {
+            return;
+        };
+        if is_closed {
+            self.preview_of(time, |viewer| viewer.edit_at(time, "camera", |s| s.camera = None));
+            return;
+        }
         let Some([width, height]) = self.full_size() else { return };
         self.move_rig(time, &mut |rig| rig.frame_all(bounds, width as f32 / height as f32));
     }
@@ -384,6 +393,7 @@ impl Viewer {
         make_legible(ui.ctx());
         self.look_at_engine(ui);
         let wanted = self.wanted.clone();
+        self.had_popup = egui::Popup::is_any_open(ui.ctx());
         // What is done with a button held is one step, however long it rests.
         ui.input(|i| self.edits.pointer(i.time, i.pointer.any_pressed(), i.pointer.any_down()));
         files::poll(ui, self);

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
 use eframe::egui;
-use egui_plot::{AxisHints, GridInput, GridMark, HoverPosition, Line, LineStyle, Plot, PlotPoints};
+use egui_plot::{AxisHints, GridInput, GridMark, HoverPosition, Line, LineStyle, Plot, PlotPoints, Points};
 use sunfleck::inspect;
 use sunfleck::ppm::StageTimes;
 
@@ -85,7 +85,7 @@ impl Kind {
 pub struct Convergence {
     by_seconds: bool,
     shown: [bool; KINDS.len()],
-    /// Lines that are not drawn: of which plot, the how manieth.
+    /// Lines that are not drawn.
     pub hidden: Hidden,
     made_of: Option<Key>,
     curves: [Vec<Curve>; KINDS.len()],
@@ -103,7 +103,21 @@ impl Default for Convergence {
     }
 }
 
-type Hidden = BTreeSet<(Kind, usize)>;
+type Hidden = BTreeSet<(Kind, Place)>;
+
+/// Which of a plot's lines it is, whatever others there are: its colour goes by the number, which a dashed one shares with the
+/// line that it belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Place {
+    number: u32,
+    dashed: bool,
+}
+
+impl Place {
+    fn color(self) -> egui::Color32 {
+        rgb(inspect::bounce_color(2 + self.number)) // The first are hard to see on white.
+    }
+}
 
 /// What lines depend on.
 type Key = (Option<Record>, Option<Measured>, Option<Measured>, bool);
@@ -113,7 +127,7 @@ type Key = (Option<Record>, Option<Measured>, Option<Measured>, bool);
 struct Curve {
     name: String,
     points: Vec<[f64; 2]>,
-    dashed: bool,
+    place: Place,
 }
 
 /// Points of the history, few enough to draw.
@@ -205,13 +219,13 @@ fn title(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &mut Hidden) {
     ui.horizontal_wrapped(|ui| {
         ui.strong(unit).on_hover_text(kind.describe());
         ui.spacing_mut().item_spacing.x = 3.0;
-        for (i, (curve, color)) in curves.iter().zip(colors(curves)).enumerate().filter(|_| curves.len() > 1) {
-            let line = (kind, i);
+        for curve in curves.iter().filter(|_| curves.len() > 1) {
+            let line = (kind, curve.place);
             let is_shown = !hidden.contains(&line);
-            let (color, name) =
-                (color.gamma_multiply(if is_shown { 1.0 } else { 0.3 }), egui::RichText::new(&curve.name));
+            let color = curve.place.color().gamma_multiply(if is_shown { 1.0 } else { 0.3 });
+            let name = egui::RichText::new(&curve.name);
             let name = if is_shown { name.small() } else { name.small().weak() };
-            let dash = egui::RichText::new(if curve.dashed { "- -" } else { "—" }).color(color).strong();
+            let dash = egui::RichText::new(if curve.place.dashed { "- -" } else { "—" }).color(color).strong();
             let button = ui.add(egui::Button::new((dash, name)).frame(false));
             button.widget_info(|| egui::WidgetInfo::selected(egui::Role::CheckBox, true, is_shown, &curve.name));
             if button.on_hover_text("Click to hide this line, or to show it again").clicked() && !hidden.remove(&line) {
@@ -219,15 +233,6 @@ fn title(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &mut Hidden) {
             }
         }
     });
-}
-
-/// Of each line; a dashed one has that of the line before.
-fn colors(curves: &[Curve]) -> impl Iterator<Item = egui::Color32> {
-    let mut n_solid = 0;
-    curves.iter().map(move |curve| {
-        n_solid += u32::from(!curve.dashed);
-        rgb(inspect::bounce_color(1 + n_solid)) // The first is hard to see on white.
-    })
 }
 
 fn plot(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &Hidden, by_seconds: bool) {
@@ -243,13 +248,10 @@ fn plot(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &Hidden, by_sec
         if !kind.is_log() || is_labelled(mark.value, range) { kind.mark(mark.value) } else { String::new() }
     };
     let label = move |at: &HoverPosition<'_>| {
-        let (name, position) = match at {
-            HoverPosition::NearDataPoint { plot_name, position, .. } => (*plot_name, position),
-            HoverPosition::Elsewhere { position } => ("", position),
-        };
+        // Elsewhere the height is no value of anything.
+        let HoverPosition::NearDataPoint { plot_name, position, .. } = at else { return None };
         let x = format!("{}{}", x_value(position.x), if by_seconds { "" } else { " iterations" });
-        let line = if name.is_empty() { String::new() } else { format!("{name}\n") };
-        Some(format!("{line}{}\n{x}", kind.value(position.y)))
+        Some(format!("{plot_name}\n{}\n{x}", kind.value(position.y)))
     };
     let group = egui::Id::unique("convergence cursor");
     let mut plot = Plot::new(("convergence", kind.name(), by_seconds))
@@ -274,11 +276,14 @@ fn plot(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &Hidden, by_sec
         plot = plot.include_y(0.0);
     }
     plot.show(ui, |plot| {
-        for (i, (curve, color)) in curves.iter().zip(colors(curves)).enumerate() {
-            if !hidden.contains(&(kind, i)) {
-                let style = if curve.dashed { LineStyle::dashed_loose() } else { LineStyle::Solid };
-                let line = Line::new(curve.name.clone(), PlotPoints::from(curve.points.clone()));
-                plot.line(line.id(egui::Id::unique((kind, i))).color(color).style(style));
+        for Curve { name, points, place } in curves.iter().filter(|curve| !hidden.contains(&(kind, curve.place))) {
+            let (id, series) = (egui::Id::unique((kind, *place)), PlotPoints::from(points.clone()));
+            if points.len() == 1 {
+                // A line of one point is not seen.
+                plot.points(Points::new(name.clone(), series).id(id).color(place.color()).radius(2.5));
+            } else {
+                let style = if place.dashed { LineStyle::dashed_loose() } else { LineStyle::Solid };
+                plot.line(Line::new(name.clone(), series).id(id).color(place.color()).style(style));
             }
         }
     });
@@ -297,17 +302,20 @@ static FIRST: Record = Record {
 /// The lines of a plot.
 fn curves(kind: Kind, sample: &Sample, alpha: f64, by_seconds: bool) -> Vec<Curve> {
     let at = |iteration: u32, seconds: f64| if by_seconds { seconds } else { f64::from(iteration) }.log10();
-    let solid =
-        |name: &str, points: Vec<[f64; 2]>| Curve { name: name.to_owned(), points: finite(points), dashed: false };
+    let solid = |number: u32, name: &str, points: Vec<[f64; 2]>| Curve {
+        name: name.to_owned(),
+        points: finite(points),
+        place: Place { number, dashed: false },
+    };
     let records = &sample.records;
     let of_records = |name: &str, value: &dyn Fn(&Record) -> f64| {
-        solid(name, records.iter().map(|r| [at(r.iteration, r.seconds), value(r)]).collect())
+        solid(0, name, records.iter().map(|r| [at(r.iteration, r.seconds), value(r)]).collect())
     };
     // Over what passed since the point before.
-    let of_means = |name: &str, value: &dyn Fn(&Record, &Record) -> f64| {
+    let of_means = |number: u32, name: &str, value: &dyn Fn(&Record, &Record) -> f64| {
         let before = std::iter::once(&FIRST).chain(&sample.means);
         let points = before.zip(&sample.means).map(|(before, r)| [at(r.iteration, r.seconds), value(before, r)]);
-        solid(name, points.collect())
+        solid(number, name, points.collect())
     };
     match kind {
         Kind::Error => {
@@ -316,30 +324,33 @@ fn curves(kind: Kind, sample: &Sample, alpha: f64, by_seconds: bool) -> Vec<Curv
             let all = alpha.min(2.0 - 2.0 * alpha);
             let lines = [("noise, estimated", &sample.estimated, noise), ("measured", &sample.against_reference, all)];
             let mut curves = vec![];
-            for (name, measured, exponent) in lines.into_iter().filter(|(_, measured, _)| !measured.is_empty()) {
+            for (number, (name, measured, exponent)) in
+                (0..).zip(lines).filter(|(_, (_, measured, _))| !measured.is_empty())
+            {
                 let points = measured.iter().map(|m| [at(m.iteration, m.seconds), m.rel_mse.log10()]).collect();
-                let curve = solid(name, points);
+                let curve = solid(number, name, points);
                 let slope = slope(&curve.points, exponent);
                 curves.push(curve);
                 let name = if by_seconds { "t" } else { "N" };
-                curves.push(Curve { name: format!("{name}^−{exponent:.2}"), points: slope, dashed: true });
+                let place = Place { number, dashed: true };
+                curves.push(Curve { name: format!("{name}^−{exponent:.2}"), points: slope, place });
             }
             let trimmed = |m: &Measured| Some([at(m.iteration, m.seconds), m.trimmed?.log10()]);
             let trimmed: Vec<_> = sample.against_reference.iter().filter_map(trimmed).collect();
             if !trimmed.is_empty() {
-                curves.push(solid("trimmed", trimmed));
+                curves.push(solid(2, "trimmed", trimmed));
             }
             curves
         }
         Kind::Radius => vec![of_records("radius", &|r| f64::from(r.radius).log10())],
         Kind::Rate => {
-            let rate = |name: &str, photons: fn(&Record) -> u32| {
-                of_means(name, &|before, r| {
+            let rate = |number, name: &str, photons: fn(&Record) -> u32| {
+                of_means(number, name, &|before, r| {
                     let n = f64::from(r.iteration - before.iteration) * f64::from(photons(r));
                     (n / (r.seconds - before.seconds)).log10()
                 })
             };
-            vec![rate("emitted", |r| r.n_paths), rate("stored", |r| r.n_photons)]
+            vec![rate(0, "emitted", |r| r.n_paths), rate(1, "stored", |r| r.n_photons)]
         }
         Kind::Stages => {
             type Stage = (&'static str, fn(&StageTimes) -> f64);
@@ -350,12 +361,12 @@ fn curves(kind: Kind, sample: &Sample, alpha: f64, by_seconds: bool) -> Vec<Curv
                 ("gather", |t| t.gather),
                 ("accumulate", |t| t.accumulate),
             ];
-            let mean = |stage: Stage| {
-                of_means(stage.0, &|before, r| {
+            let mean = |(number, stage): (u32, Stage)| {
+                of_means(number, stage.0, &|before, r| {
                     1e3 * (stage.1(&r.times) - stage.1(&before.times)) / f64::from(r.iteration - before.iteration)
                 })
             };
-            stages.into_iter().map(mean).collect()
+            (0..).zip(stages).map(mean).collect()
         }
     }
 }
@@ -406,13 +417,13 @@ fn count(n: f64) -> String {
     match n {
         n if n >= 0.9e6 => format!("{:.0}M", n / 1e6),
         n if n >= 0.9e4 => format!("{:.0}k", n / 1e3),
-        n if n >= 0.9 => format!("{n:.0}"),
+        n if n > 0.99 => format!("{n:.0}"),
         _ => String::new(),
     }
 }
 
 fn small_number(n: f64) -> String {
-    if n >= 0.9 { count(n) } else { format!("{}", (n * 1e6).round() / 1e6) }
+    if n > 0.99 { count(n) } else { format!("{}", (n * 1e6).round() / 1e6) }
 }
 
 #[cfg(test)]
@@ -454,7 +465,7 @@ mod tests {
     fn slopes_touch_the_last_point() {
         let error = curves(Kind::Error, &sample(), 0.5, false);
         assert_eq!(
-            error.iter().map(|c| (c.name.as_str(), c.dashed)).collect::<Vec<_>>(),
+            error.iter().map(|c| (c.name.as_str(), c.place.dashed)).collect::<Vec<_>>(),
             [("noise, estimated", false), ("N^−0.50", true)]
         );
         assert_eq!(error[0].points.last(), error[1].points.last());
@@ -465,6 +476,9 @@ mod tests {
         let names: [Vec<String>; 2] = [0.9, 2.0 / 3.0].map(names);
         assert_eq!(names[0], ["noise, estimated", "t^−0.90", "measured", "t^−0.20"]);
         assert_eq!((&names[1][1], &names[1][3]), (&"t^−0.67".to_owned(), &"t^−0.67".to_owned()));
+        // A line keeps its colour when the noise, which takes two iterations, comes beside it.
+        let alone = curves(Kind::Error, &Sample { estimated: vec![], ..with_reference }, 0.5, false);
+        assert_eq!((&*alone[0].name, alone[0].place), ("measured", Place { number: 1, dashed: false }));
     }
 
     #[test]
@@ -500,7 +514,7 @@ mod tests {
         // Of a range in which there may be no 1, 2 or 5, every digit; what lies outside of it is not drawn.
         assert_eq!(one.len(), marks.len());
         assert!(log_marks(GridInput { bounds: (-1e9, 1e9), base_step_size: 1.0 }).is_empty());
-        assert_eq!([1e3, 2e4, 5e6].map(count), ["1000", "20k", "5M"]);
+        assert_eq!([0.9, 1.0, 1e3, 2e4, 5e6].map(count), ["", "1", "1000", "20k", "5M"]);
         assert_eq!((Kind::Error.mark(-3.0), Kind::Radius.mark(-3.0)), ("1e-3".to_owned(), "1.00 mm".to_owned()));
     }
 }

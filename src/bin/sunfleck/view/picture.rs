@@ -162,7 +162,7 @@ fn on_film(rect: Rect, size: [usize; 2], point: egui::Pos2) -> Option<glam::Vec2
 
 /// Selects what is clicked on; a double click also turns to it.
 fn click(ui: &egui::Ui, viewer: &mut Viewer, response: &egui::Response, rect: Rect, painted: &Painted) {
-    if !response.clicked_by(PointerButton::Primary) {
+    if !response.clicked_by(PointerButton::Primary) || viewer.had_popup {
         return;
     }
     let Some(point) = response.interact_pointer_pos() else { return };
@@ -274,7 +274,9 @@ fn move_camera(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, response: &egui::
     // What is shown follows the cursor, however large it is shown.
     let shown = viewer.picture.rect.unwrap_or(area);
     let height = shown.height().max(1.0);
-    let drag = response.drag_delta() / height;
+    // What the pointer moved before the press, perhaps in the same frame, is no drag.
+    let is_new = ui.input(|i| i.pointer.any_pressed());
+    let drag = if is_new { Vec2::ZERO } else { response.drag_delta() / height };
     let (shift, command) = ui.input(|i| (i.modifiers.shift, i.modifiers.command));
     if drag != Vec2::ZERO && !command {
         let is_pan = response.dragged_by(PointerButton::Middle) || shift && response.dragged_by(PointerButton::Primary);

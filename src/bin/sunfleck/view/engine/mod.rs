@@ -122,6 +122,8 @@ pub struct Opened {
     /// Least and greatest corner of the scene and of the spheres that its settings add, metres; those of a cube of side 1
     /// about the origin if there is nothing.
     pub bounds: [Vec3; 2],
+    /// Whether nothing lit is seen from outside of them: the default camera stands inside.
+    pub is_closed: bool,
 }
 
 impl Opened {

@@ -65,9 +65,12 @@ pub fn open(choice: &Arc<Choice>) -> Result<Opened> {
     let read = source.settings.clone();
     source.set(&choice.set)?;
     let mut loaded = source.scene()?;
+    let has_camera = !loaded.scene.cameras.is_empty();
     source.settings.add_default_camera(&mut loaded.scene);
     let bounds = loaded.scene.bounds(&source.settings.added_spheres()).unwrap_or([-0.5, 0.5].map(Vec3::splat));
-    Ok(Opened { choice: Arc::clone(choice), source, read, loaded, bounds })
+    let stands_at = loaded.scene.cameras.first().map(|camera| Vec3::from(camera.world_from_camera.translation));
+    let is_inside = stands_at.is_some_and(|at| at.clamp(bounds[0], bounds[1]) == at);
+    Ok(Opened { choice: Arc::clone(choice), source, read, loaded, bounds, is_closed: !has_camera && is_inside })
 }
 
 #[cfg(test)]

@@ -37,6 +37,7 @@ pub fn color(ui: &mut Ui, name: &str, color: &mut [f32; 3], most: Option<f32>) -
     popup.width(WIDTH).show(|ui| {
         ui.set_style(style);
         ui.set_width(WIDTH);
+        ui.style_mut().interaction.selectable_labels = false;
         beside(&hues(ui, color), "Hue, and upwards how strong it is. The largest of the three numbers stays.");
         let mut is_left = false;
         ui.horizontal(|ui| {

@@ -3,7 +3,6 @@
 use eframe::egui;
 use egui::Ui;
 use glam::Vec3;
-use sunfleck::scene::defaults::has_light;
 use sunfleck::scene::settings::{EnvironmentSettings, MaterialSettings, SceneLightSettings, Settings};
 use sunfleck::scene::{PunctualKind, PunctualLight, Scene};
 
@@ -42,8 +41,8 @@ impl Sky {
             (Some(file), ..) => Self::File(file),
             (None, Some(color), _) => Self::Color(color),
             (None, None, Some(own)) => Self::Own { rotation: own.rotation.to_degrees(), strength: own.strength },
-            (None, None, None) if has_light(scene) || !settings.lights.is_empty() => Self::None,
-            (None, None, None) => Self::Default,
+            (None, None, None) if settings.needs_sky(scene) => Self::Default,
+            (None, None, None) => Self::None,
         }
     }
 }
@@ -60,7 +59,7 @@ pub fn environment(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
             Sky::File(file) => file,
             Sky::Color(_) => "one colour",
             Sky::Own { .. } => "the scene's own",
-            Sky::Default => "a soft sky, as nothing else gives light",
+            Sky::Default => "a soft sky, as the scene comes without light",
             Sky::None => "none",
         };
         ui.add(egui::Label::new(text).truncate())
@@ -186,7 +185,13 @@ fn light(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, i: us
                     ui.set_min_width(width);
                     ui.set_max_width(width);
                     let hint = format!("{name}, {}: whether it shines. Restarts the estimate.", kind(light));
-                    if ui.add(egui::Checkbox::new(&mut on, egui::RichText::new(&name))).on_hover_text(hint).changed() {
+                    let title = egui::WidgetText::from(&name).into_galley(
+                        ui,
+                        Some(egui::TextWrapMode::Truncate),
+                        (width - ui.spacing().icon_width - ui.spacing().icon_spacing).max(0.0),
+                        egui::TextStyle::Button,
+                    );
+                    if ui.add(egui::Checkbox::new(&mut on, title)).on_hover_text(hint).changed() {
                         now.on = Some(on);
                     }
                 },

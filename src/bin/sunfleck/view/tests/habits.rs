@@ -28,6 +28,29 @@ fn with_file(text: &str) -> (Window, std::path::PathBuf) {
 
 const OWN: &str = "scene = \"cornell\"\nsize = [16, 12]\nphotons = 200\nalpha = 0.6\n";
 
+/// A room that is closed on all sides, its lamp inside, and no camera.
+#[test]
+fn all_of_a_closed_room_is_seen_from_inside() {
+    let mut window = Window::new(None);
+    let file = window.path("room.obj");
+    let corner = |i: usize| [0, 1, 2].map(|axis| if i >> axis & 1 == 1 { 1.0 } else { -1.0 });
+    let lamp = [[-0.2, 0.9, -0.2], [0.2, 0.9, -0.2], [0.2, 0.9, 0.2], [-0.2, 0.9, 0.2]];
+    let vertices = (0..8).map(corner).chain(lamp).map(|[x, y, z]| format!("v {x} {y} {z}\n"));
+    let sides = "f 1 2 4 3\nf 5 6 8 7\nf 1 2 6 5\nf 3 4 8 7\nf 1 3 7 5\nf 2 4 8 6\n";
+    let text = vertices.collect::<String>() + "usemtl wall\n" + sides + "usemtl lamp\nf 9 10 11 12\n";
+    std::fs::write(&file, format!("mtllib room.mtl\n{text}")).unwrap();
+    std::fs::write(window.path("room.mtl"), "newmtl wall\nKd 0.8 0.8 0.8\nnewmtl lamp\nKd 0 0 0\nKe 9 9 9\n").unwrap();
+    window.viewer().open(file.to_string_lossy());
+    window.wait_for_picture();
+    let at = |window: &mut Window| window.viewer().rig().unwrap().camera().world_from_camera.translation;
+    let opened_at = at(&mut window);
+    assert!(opened_at.abs().max_element() < 1.0, "{opened_at}");
+    window.viewer().move_rig(0.0, &mut |rig| rig.orbit(0.5, 0.1));
+    assert_ne!(at(&mut window), opened_at);
+    window.press(Modifiers::NONE, Key::F);
+    assert_eq!(at(&mut window), opened_at);
+}
+
 #[test]
 fn shift_may_be_let_go_first() {
     let mut window = Window::with_picture();
