@@ -492,12 +492,22 @@ fn a_scene_without_light_gets_some_and_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let mut scene = floor();
     scene["scenes"][0]["nodes"] = json!([0, 2]);
-    write_scene(folder.path(), &scene, &CORNERS, &INDICES);
-    let output = render(folder.path(), "-o a.exr");
-    assert!(output.status.success());
-    assert!(stderr(&output).starts_with("sunfleck: warning: "), "{}", stderr(&output));
-    let picture = output::exr::read(&folder.path().join("a.exr")).unwrap();
-    assert!(picture.rgb[8 * 32 + 16][0] > 0.01);
+    let file = write_scene(folder.path(), &scene, &CORNERS, &INDICES);
+    let lit = |flags: &str| {
+        let output = render(folder.path(), flags);
+        assert!(output.status.success());
+        assert_eq!(stderr(&output).starts_with("sunfleck: warning: "), flags == "-o a.exr", "{}", stderr(&output));
+        output::exr::read(&folder.path().join("a.exr")).unwrap().rgb[8 * 32 + 16][0]
+    };
+    assert!(lit("-o a.exr") > 0.01);
+    assert_eq!(lit("-o a.exr --set environment.color=[0,0,0]"), 0.0);
+    // It is no part of the scene, and nothing is written for it.
+    let own = folder.path().join("copy.hdr");
+    fs::write(&own, "mine").unwrap();
+    let name = file.to_str().unwrap();
+    let output = sunfleck(folder.path(), ["export", name, "-o", "copy.glb"]);
+    assert!(output.status.success() && stderr(&output) == "wrote copy.glb\n", "{}", stderr(&output));
+    assert_eq!(fs::read(own).unwrap(), b"mine");
 }
 
 #[test]

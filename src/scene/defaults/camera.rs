@@ -62,10 +62,13 @@ pub fn default_camera(scene: &Scene, more: &[Sphere]) -> Camera {
         });
     }
     let inside = || {
+        if lamps.is_sunny() {
+            return None;
+        }
         let room = Room::new(scene, &lamps)?;
         let up = if is_z_up { Vec3::Z } else { Vec3::Y };
         let [low, high] = bounding_box(scene, more, with_inward)?;
-        if room.is_dark(&best.1, LEAST_SHARE) { room.camera_inside([low, high], up) } else { None }
+        if room.is_dark(&best.1, LEAST_SHARE) { room.camera_inside([low, high], up, more) } else { None }
     };
     inside().unwrap_or(best.1)
 }
@@ -309,6 +312,10 @@ mod tests {
                 let at = Vec3::from(camera.world_from_camera.translation);
                 assert!(at.abs().max_element() < 1.0 && camera.focus_distance > 0.5, "{up}: {camera:?}");
                 assert!(stands(&camera)[1].dot(up) > 0.9, "{up}: {camera:?}");
+                // A ball where it stood.
+                let ball = Sphere { centre: at, radius: 0.2, inward: false, material: 0 };
+                let aside = Vec3::from(default_camera(&scene, &[ball]).world_from_camera.translation);
+                assert!(aside.distance(at) > 0.2 && aside.abs().max_element() < 1.0, "{up}: {aside}");
             }
         }
     }

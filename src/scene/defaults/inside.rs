@@ -2,7 +2,7 @@
 
 use super::view::{Lamps, Seen, hides_from, lets_through};
 use crate::index::kd::{Hit, KdOptions, LazyKd, Ray, RaySearch, Triangles};
-use crate::scene::{Camera, Material, Scene};
+use crate::scene::{Camera, Material, Scene, Sphere};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -13,12 +13,14 @@ const YFOV: f32 = 60_f32.to_radians();
 /// Rays of a look, across and down.
 const LOOK: [usize; 2] = [24, 16];
 const N_RAYS: usize = LOOK[0] * LOOK[1];
-/// Least share of what is seen that must be lit.
+/// Least share of the rays that must meet something lit.
 const LEAST_LIT: f32 = 0.25;
 /// How far from the middle towards the walls to stand; from there one can turn about the middle of a square room.
 const ASIDE: f32 = 0.7;
 /// Heights to look from, as shares of the room's; of a house with several floors one of them is no ceiling.
 const HEIGHTS: [f32; 3] = [0.5, 0.3, 0.75];
+/// How far from the middle of a sphere to stand, in radii.
+const AIR: f32 = 1.5;
 /// What rays leave out at either end, as a share of their length.
 const GAP: f32 = 1e-3;
 
@@ -56,7 +58,7 @@ impl Look {
     }
 }
 
-/// What rays meet: the triangles of a scene.
+/// What rays meet: the triangles of a scene. Of spheres only their places are looked at.
 pub struct Room<'a> {
     scene: &'a Scene,
     lamps: &'a Lamps,
@@ -88,9 +90,16 @@ impl<'a> Room<'a> {
         (look.n_lit as f32) < share * look.n_seen as f32
     }
 
-    /// A camera between the corners `low` and `high` that sees far, and what lamps shine on; none if there is no such place.
-    pub fn camera_inside(&self, [low, high]: [Vec3; 2], up: Vec3) -> Option<Camera> {
-        let cameras: Vec<_> = HEIGHTS.into_iter().flat_map(|height| places(low, high, up, height)).collect();
+    /// A camera between the corners `low` and `high` that sees far, and what lamps shine on, in none of the spheres `more`
+    /// and of those of the scene; none if there is no such place.
+    pub fn camera_inside(&self, [low, high]: [Vec3; 2], up: Vec3, more: &[Sphere]) -> Option<Camera> {
+        let is_free = |camera: &Camera| {
+            let eye = Vec3::from(camera.world_from_camera.translation);
+            let mut spheres = self.scene.spheres.iter().chain(more).filter(|sphere| !sphere.inward);
+            spheres.all(|sphere| sphere.centre.distance(eye) > AIR * sphere.radius)
+        };
+        let places = HEIGHTS.into_iter().flat_map(|height| places(low, high, up, height));
+        let cameras: Vec<_> = places.filter(is_free).collect();
         let looks: Vec<_> = cameras.par_iter().map(|camera| self.look(camera)).collect();
         let is_lit = |look: &Look| look.n_lit as f32 >= LEAST_LIT * N_RAYS as f32;
         let views = cameras.into_iter().zip(looks).filter(|(_, look)| is_lit(look));
@@ -114,7 +123,7 @@ impl<'a> Room<'a> {
             let direction = (forward + x * packed.half_width * right + y * packed.half_height * up).normalize();
             let Some((hit, seen)) = self.seen(eye, direction) else { continue };
             look.n_seen += 1;
-            if self.lamps.light(&seen, eye, |to_lamp| self.is_clear(seen.p, to_lamp)) {
+            if self.lamps.is_lit(&seen, eye, |to_lamp| self.is_clear(seen.p, to_lamp)) {
                 look.n_lit += 1;
                 look.sum_of_distances += (eye.distance(seen.p) / self.lamps.reach).min(1.0);
                 *look.parts.entry((self.mesh_of[hit.face as usize], side(seen.normal))).or_default() += 1;

@@ -16,8 +16,8 @@ const SKY_HEIGHT: u32 = 128;
 /// Gives a scene in which nothing shines ([`has_light`]) a soft sky, and says so.
 pub fn add_default_light(scene: &mut Scene) -> String {
     let warning = match used_materials(scene).any(|material| material.emission != Vec3::ZERO) {
-        true => "nothing in the scene gives light but painted glow: a soft sky is added",
-        false => "nothing in the scene gives light: a soft sky is added",
+        true => "nothing in the scene's file gives light but painted glow: a soft sky is added",
+        false => "nothing in the scene's file gives light: a soft sky is added",
     };
     scene.environment = Some(default_sky());
     warning.into()

@@ -77,7 +77,12 @@ impl Lamps {
     pub fn lit_and_seen(&self, scene: &Scene, camera: &Camera) -> [usize; 2] {
         let seen = seen(scene, camera);
         let eye = Vec3::from(camera.world_from_camera.translation);
-        [seen.iter().filter(|seen| self.light(seen, eye, |_| true)).count(), seen.len()]
+        [seen.iter().filter(|seen| self.is_lit(seen, eye, |_| true)).count(), seen.len()]
+    }
+
+    /// Whether one of them shines from far outside.
+    pub fn is_sunny(&self) -> bool {
+        self.lamps.iter().any(|lamp| matches!(lamp, Lamp::Directional(_)))
     }
 
     /// How much farther towards z than towards y the lamps of a scene around `centre` lie, on average, metres.
@@ -86,9 +91,9 @@ impl Lamps {
         (sum.z - sum.y) / self.lamps.len() as f32
     }
 
-    /// Whether what is seen from `eye` shines, lets light through, or faces a lamp of which `is_clear` says, given how far
+    /// Whether what is seen from `eye` is lit: shines, lets light through, or faces a lamp of which `is_clear` says, given how far
     /// it is from there, that nothing is between.
-    pub fn light(&self, seen: &Seen, eye: Vec3, is_clear: impl Fn(Vec3) -> bool) -> bool {
+    pub fn is_lit(&self, seen: &Seen, eye: Vec3, is_clear: impl Fn(Vec3) -> bool) -> bool {
         let Seen { p, normal, material } = *seen;
         let normal = if normal.dot(eye - p) < 0.0 { -normal } else { normal };
         let shines = |lamp: &Lamp| lamp.faces(p, normal) && is_clear(lamp.offset_from(p, self.reach));

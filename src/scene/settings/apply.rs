@@ -180,9 +180,12 @@ impl Settings {
     /// lights does not count: one whose lights are turned off is black, and one that a material begins to light keeps its
     /// sky.
     pub fn needs_sky(&self, scene: &Scene) -> bool {
+        let glows = |emission: Option<[f32; 3]>| emission.is_some_and(|emission| emission != [0.0; 3]);
         let shines = |sphere: &SphereSettings| {
-            let named = || scene.materials.iter().find(|m| Some(&m.name) == sphere.material.as_ref());
-            sphere.emission.is_some_and(|emission| emission != [0.0; 3]) || named().is_some_and(is_lamp)
+            let named = || scene.materials.iter().any(|m| Some(&m.name) == sphere.material.as_ref() && is_lamp(m));
+            let made =
+                || self.materials.iter().any(|m| m.name.is_some() && m.name == sphere.material && glows(m.emission));
+            glows(sphere.emission) || named() || made()
         };
         let brings_sky = self.environment.as_ref().is_some_and(|e| e.file.is_some() || e.color.is_some());
         !has_light(scene) && !brings_sky && self.lights.is_empty() && !self.spheres.iter().any(shines)

@@ -310,7 +310,8 @@ impl Viewer {
             return;
         };
         if is_closed {
-            self.preview_of(time, |viewer| viewer.edit_at(time, "camera", |s| s.camera = None));
+            let camera = self.editing.as_ref().and_then(|opened| opened.source.settings.camera.clone());
+            self.preview_of(time, |viewer| viewer.edit_at(time, "camera", |s| s.camera = camera));
             return;
         }
         let Some([width, height]) = self.full_size() else { return };

@@ -216,6 +216,11 @@ pub fn section(ui: &mut egui::Ui, viewer: &mut Viewer) {
     });
 }
 
+/// While there is no picture there is no line, either.
+pub fn let_go(viewer: &mut Viewer) {
+    viewer.compare.hold = None;
+}
+
 /// The line of the wipe, if there is one. Only the left button moves it; drags with another are for the camera.
 pub fn handle(ui: &egui::Ui, viewer: &Viewer) -> Option<Response> {
     let response = ui.interact(viewer.compare.hold?, egui::Id::unique("wipe"), egui::Sense::drag());

@@ -119,6 +119,7 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
     move_camera(ui, viewer, area, &hand);
     super::failure::show(ui, viewer, area);
     let Some(painted) = viewer.picture.painted.clone() else {
+        super::compare::let_go(viewer);
         waiting(ui, viewer, area);
         return;
     };

@@ -122,7 +122,7 @@ pub struct Opened {
     /// Least and greatest corner of the scene and of the spheres that its settings add, metres; those of a cube of side 1
     /// about the origin if there is nothing.
     pub bounds: [Vec3; 2],
-    /// Whether nothing lit is seen from outside of them: the default camera stands inside.
+    /// Whether the default camera stands within them: in a closed room, or under a dome.
     pub is_closed: bool,
 }
 

@@ -4,10 +4,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::Result;
+use glam::Vec3;
 use sunfleck::layout;
 use sunfleck::ppm::{Error, Params};
 use sunfleck::scene::settings::{Count, Direct, FirstRadius, Index, Kernel, Settings, Size};
-use sunfleck::scene::{Accelerator, Scene};
+use sunfleck::scene::{Accelerator, Environment, Scene};
 
 use super::reading::{self, Reader};
 use super::session::Session;
@@ -305,7 +306,9 @@ fn is_changed_alike(scene: &Scene, before: &Settings, now: &Settings) -> bool {
     let changed = |settings: &Settings| {
         let Scene { materials, lights, cameras, .. } = scene;
         let (materials, lights, cameras) = (materials.clone(), lights.clone(), cameras.clone());
-        let mut changed = Scene { materials, lights, cameras, ..Scene::default() };
+        // Or it would be given a sky.
+        let environment = Some(Environment::uniform(Vec3::ONE));
+        let mut changed = Scene { materials, lights, cameras, environment, ..Scene::default() };
         let Settings { materials, scene_lights, .. } = settings.clone();
         let changes = Settings { materials, scene_lights, ..Settings::default() };
         changes.apply_to_scene(&mut changed, Path::new("")).ok()?;

@@ -167,7 +167,8 @@ fn properties(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, 
         number_row(ui, viewer, property);
     }
     color_row(ui, viewer, EMISSION, |m| &mut m.emission, own.emission, f32::MAX);
-    if before.emission.map_or(own.emission, Vec3::from) != Vec3::ZERO {
+    let shines = before.emission.map_or(own.emission, Vec3::from) != Vec3::ZERO;
+    if shines || before.emission_strength != was.emission_strength {
         let factor = unit(EMISSION_FACTOR, |m| &mut m.emission_strength, 1.0);
         number_row(ui, viewer, Property { range: [0.0, 1000.0], ..factor });
     }
