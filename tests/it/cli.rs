@@ -508,6 +508,10 @@ fn a_scene_without_light_gets_some_and_says_so() {
     let output = sunfleck(folder.path(), ["export", name, "-o", "copy.glb"]);
     assert!(output.status.success() && stderr(&output) == "wrote copy.glb\n", "{}", stderr(&output));
     assert_eq!(fs::read(own).unwrap(), b"mine");
+    // Unless something is changed about light.
+    fs::write(folder.path().join("bright.toml"), "scene = \"floor.gltf\"\n[environment]\nstrength = 2\n").unwrap();
+    let output = sunfleck(folder.path(), words("export bright.toml -o bright.glb"));
+    assert!(output.status.success() && folder.path().join("bright.hdr").exists(), "{}", stderr(&output));
 }
 
 #[test]

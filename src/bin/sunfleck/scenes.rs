@@ -205,14 +205,17 @@ pub fn export(args: &ExportArgs) -> Result<ExitCode> {
     atomic::check(path)?;
     let source = Source::resolve(&args.scene)?;
     let mut loaded = source.scene()?;
-    // The soft sky of a scene without light is no part of it: who reads the file gives it one, too.
-    let needs_sky = source.settings.needs_sky(&loaded.scene);
-    if needs_sky {
+    // The soft sky of a scene without light is no part of it: who reads the file gives it the same, if nothing is changed
+    // about light.
+    let Settings { environment, light_scale, materials, .. } = &source.settings;
+    let is_changed = environment.is_some() || light_scale.is_some() || !materials.is_empty();
+    let drops_sky = !is_changed && source.settings.needs_sky(&loaded.scene);
+    if drops_sky {
         loaded.scene.environment = Some(Environment::uniform(glam::Vec3::ONE));
     }
     source.apply(&source.settings, &mut loaded)?;
     let Loaded { mut scene, warnings } = loaded;
-    scene.environment.take_if(|_| needs_sky);
+    scene.environment.take_if(|_| drops_sky);
     for warning in warnings {
         eprintln!("sunfleck: warning: {}", crate::one_line(&warning));
     }

@@ -250,7 +250,12 @@ fn plot(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &Hidden, by_sec
     let label = move |at: &HoverPosition<'_>| {
         // Elsewhere the height is no value of anything.
         let HoverPosition::NearDataPoint { plot_name, position, .. } = at else { return None };
-        let x = format!("{}{}", x_value(position.x), if by_seconds { "" } else { " iterations" });
+        let x = x_value(position.x);
+        let x = match (by_seconds, &*x) {
+            (true, _) => x,
+            (false, "1") => "1 iteration".to_owned(),
+            (false, n) => format!("{n} iterations"),
+        };
         Some(format!("{plot_name}\n{}\n{x}", kind.value(position.y)))
     };
     let group = egui::Id::unique("convergence cursor");

@@ -176,9 +176,12 @@ impl Have {
             None => {
                 let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
                 shared.update(|board| board.phase = Phase::Preparing);
-                let before = self.session.take().map(Session::into_scene); // Its memory first.
+                let before = self.session.take();
+                // What has been said of this scene is not said again at every change.
+                let is_new = |warning: &&String| before.as_ref().is_none_or(|b| !b.input.warnings.contains(warning));
+                let warnings: Vec<_> = input.warnings.iter().filter(is_new).cloned().map(Message::Warning).collect();
+                let before = before.map(Session::into_scene); // Its memory first.
                 device.follow(&settings)?;
-                let warnings: Vec<_> = input.warnings.iter().cloned().map(Message::Warning).collect();
                 let (settings, interrupt) = (Arc::new(settings), shared.interrupt());
                 let session = Session::new(device, opened, settings, input, before.as_deref(), interrupt)?;
                 shared.update(|board| {

@@ -28,6 +28,25 @@ fn with_file(text: &str) -> (Window, std::path::PathBuf) {
 
 const OWN: &str = "scene = \"cornell\"\nsize = [16, 12]\nphotons = 200\nalpha = 0.6\n";
 
+/// A warning that has passed does not come back with every change.
+#[test]
+fn what_was_said_of_a_scene_is_not_said_again() {
+    let mut window = Window::new(None);
+    let file = window.path("dark.obj");
+    std::fs::write(&file, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    window.viewer().open(file.to_string_lossy());
+    window.wait_for_message("a soft sky is added");
+    window.wait_for_picture();
+    window.steps(400);
+    assert!(!window.shows("a soft sky is added"));
+    let estimate = window.viewer().picture.painted().unwrap().frame.estimate;
+    window.viewer().edit_at(0.0, "light scale", |s| s.light_scale = Some(2.0));
+    window.wait("picture", move |viewer| {
+        assert!(viewer.messages.texts().all(|text| !text.contains("sky")));
+        viewer.picture.painted().is_some_and(|painted| painted.frame.estimate > estimate)
+    });
+}
+
 /// A room that is closed on all sides, its lamp inside, and no camera.
 #[test]
 fn all_of_a_closed_room_is_seen_from_inside() {
