@@ -17,6 +17,7 @@ use std::time::{Duration, Instant};
 use eframe::egui;
 use egui::{Event, Key, Modifiers, ViewportCommand};
 use egui_kittest::{Harness, TestRenderer};
+use sunfleck::layout::Camera;
 use tempfile::TempDir;
 
 use super::app::{First, Viewer};
@@ -95,8 +96,11 @@ impl Window {
         window
     }
 
+    /// Of where the camera is: one of before may be finished while the render thread has not seen what was done.
     fn wait_for_picture(&mut self) {
         self.wait("finished picture", |viewer| {
+            let stands = |camera: &Camera| (camera.position, camera.forward, camera.up);
+            let camera = viewer.camera().map(|camera| camera.pack(1, 1));
             let n = |frame: &super::engine::Frame| !frame.is_preview && frame.film.n_iterations == ITERATIONS;
             viewer.now.phase == Phase::Reached
                 && !viewer.wanted.moving
@@ -104,6 +108,7 @@ impl Window {
                     let frame = &painted.frame;
                     n(frame)
                         && frame.estimate == viewer.now.estimate
+                        && camera.as_ref().is_none_or(|camera| stands(camera) == stands(&frame.camera))
                         && Arc::ptr_eq(&frame.opened, viewer.opened().unwrap())
                 })
         });
