@@ -44,7 +44,7 @@ pub enum FirstRadius {
 }
 
 /// What a render is asked to do. Nothing here depends on the backend.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Params {
     /// Whole picture, pixels: width, height.
     pub size: [u32; 2],

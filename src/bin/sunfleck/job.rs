@@ -119,7 +119,7 @@ pub fn prepare_again(input: &mut Input, settings: &Settings, cameras: &[Camera])
 }
 
 /// The command line over the settings over the defaults.
-fn params(settings: &Settings, args: &InputArgs, camera: &Camera) -> Result<Params> {
+pub fn params(settings: &Settings, args: &InputArgs, camera: &Camera) -> Result<Params> {
     let [width, height] = args.resolution.unwrap_or_else(|| size(settings, camera));
     let mut params = Params::new(width, height);
     if args.paper {

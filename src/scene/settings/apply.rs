@@ -131,12 +131,7 @@ impl Settings {
         if self.needs_sky(scene) {
             warnings.push(add_default_light(scene));
         }
-        for (i, material) in self.materials.iter().enumerate() {
-            material.apply(&mut scene.materials, &format!("material[{i}]")).map_err(wrong)?;
-        }
-        for (i, light) in self.scene_lights.iter().enumerate() {
-            light.apply(&mut scene.lights, &format!("scene_light[{i}]")).map_err(wrong)?;
-        }
+        self.change_materials_and_lights(&mut scene.materials, &mut scene.lights)?;
         for (i, sphere) in self.spheres.iter().enumerate() {
             sphere.apply(scene, i).map_err(wrong)?;
         }
@@ -151,6 +146,22 @@ impl Settings {
             camera.apply(&mut scene.cameras).map_err(wrong)?;
         }
         Ok(warnings)
+    }
+
+    /// Changes those of a scene's materials and lights that the settings name, as applying them does, and nothing else.
+    pub fn change_materials_and_lights(
+        &self,
+        materials: &mut [Material],
+        lights: &mut [PunctualLight],
+    ) -> Result<(), SettingsError> {
+        let wrong = |(field, problem): Wrong| SettingsError::Field { field, problem };
+        for (i, material) in self.materials.iter().enumerate() {
+            material.apply(materials, &format!("material[{i}]")).map_err(wrong)?;
+        }
+        for (i, light) in self.scene_lights.iter().enumerate() {
+            light.apply(lights, &format!("scene_light[{i}]")).map_err(wrong)?;
+        }
+        Ok(())
     }
 }
 

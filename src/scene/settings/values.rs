@@ -13,32 +13,29 @@ pub struct Count(pub u32);
 pub struct Size(pub [u32; 2]);
 
 /// The first radius, written in metres or `"automatic"`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FirstRadius {
     /// Chosen by the renderer, pixel by pixel.
-    #[default]
     Automatic,
     /// Metres.
     Fixed(f32),
 }
 
 /// Density estimation kernel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kernel {
     /// Falls to nothing at the radius.
-    #[default]
     Epanechnikov,
     /// The same everywhere.
     Constant,
 }
 
 /// Who brings light straight from a lamp.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Direct {
     /// Lights are sampled.
-    #[default]
     Sampled,
     /// Photons.
     Photons,

@@ -306,16 +306,14 @@ impl Viewer {
 
     /// Moves the camera until the whole scene is in the picture; in a closed room, to where it stood in the beginning.
     pub fn frame_all(&mut self, time: f64) {
-        let Some((bounds, is_closed)) = self.editing.as_ref().map(|opened| (opened.bounds, opened.is_closed)) else {
-            return;
-        };
-        if is_closed {
-            let camera = self.editing.as_ref().and_then(|opened| opened.source.settings.camera.clone());
+        let Some(opened) = self.editing.clone() else { return };
+        if opened.is_closed {
+            let camera = opened.source.settings.camera.clone();
             self.preview_of(time, |viewer| viewer.edit_at(time, "camera", |s| s.camera = camera));
             return;
         }
         let Some([width, height]) = self.full_size() else { return };
-        self.move_rig(time, &mut |rig| rig.frame_all(bounds, width as f32 / height as f32));
+        self.move_rig(time, &mut |rig| rig.frame_all(opened.bounds, width as f32 / height as f32));
     }
 
     /// The settings as `file` is to hold them.

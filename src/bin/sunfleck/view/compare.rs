@@ -216,14 +216,10 @@ pub fn section(ui: &mut egui::Ui, viewer: &mut Viewer) {
     });
 }
 
-/// While there is no picture there is no line, either.
-pub fn let_go(viewer: &mut Viewer) {
-    viewer.compare.hold = None;
-}
-
-/// The line of the wipe, if there is one. Only the left button moves it; drags with another are for the camera.
-pub fn handle(ui: &egui::Ui, viewer: &Viewer) -> Option<Response> {
-    let response = ui.interact(viewer.compare.hold?, egui::Id::unique("wipe"), egui::Sense::drag());
+/// The line of the wipe, if the last frame had one; this one has it if [`overlay`] draws it. Only the left button moves it;
+/// drags with another are for the camera.
+pub fn handle(ui: &egui::Ui, viewer: &mut Viewer) -> Option<Response> {
+    let response = ui.interact(viewer.compare.hold.take()?, egui::Id::unique("wipe"), egui::Sense::drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Wipe"));
     Some(response)
 }
@@ -236,7 +232,7 @@ pub fn overlay(
     rect: Rect,
     handle: Option<&Response>,
 ) -> Option<f32> {
-    let held_before = viewer.compare.hold.take();
+    let held_before = handle.map(|handle| handle.rect);
     if handle.is_some_and(Response::dragged) {
         // The camera is turned by it, and its previews have no line.
         viewer.compare.hold = held_before;

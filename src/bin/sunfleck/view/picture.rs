@@ -119,7 +119,6 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
     move_camera(ui, viewer, area, &hand);
     super::failure::show(ui, viewer, area);
     let Some(painted) = viewer.picture.painted.clone() else {
-        super::compare::let_go(viewer);
         waiting(ui, viewer, area);
         return;
     };

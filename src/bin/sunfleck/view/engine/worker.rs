@@ -1,14 +1,12 @@
 //! The render thread.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::Result;
-use glam::Vec3;
 use sunfleck::layout;
 use sunfleck::ppm::{Error, Params};
-use sunfleck::scene::settings::{Count, Direct, FirstRadius, Index, Kernel, Settings, Size};
-use sunfleck::scene::{Accelerator, Environment, Scene};
+use sunfleck::scene::settings::{Index, Settings};
+use sunfleck::scene::{Accelerator, Scene};
 
 use super::reading::{self, Reader};
 use super::session::Session;
@@ -279,67 +277,30 @@ pub fn is_asked_anew(opened: &Opened, before: &Wanted, now: &Wanted) -> bool {
 fn is_rendered_alike(opened: &Opened, before: &Wanted, now: &Wanted) -> bool {
     let [a, b] = [before, now].map(|wanted| wanted.settings.as_deref().unwrap_or(&opened.source.settings));
     is_same(before.settings.as_ref(), now.settings.as_ref())
-        || rendered(opened, a) == rendered(opened, b) && is_changed_alike(&opened.loaded.scene, a, b)
+        || rendered(opened, a).is_some_and(|a| Some(a) == rendered(opened, b))
+            && is_changed_alike(&opened.loaded.scene, a, b)
 }
 
-/// Those settings that the estimate depends on, but for the changes to materials and lights: of the camera, what it comes to.
-fn rendered(opened: &Opened, settings: &Settings) -> (Settings, Option<layout::Camera>) {
-    let camera = settings.camera_of(&opened.loaded.scene.cameras).ok().map(|mut camera| {
-        if camera.aperture_radius == 0.0 {
-            camera.focus_distance = 1.0;
-        }
-        camera
-    });
-    let rest = Settings {
-        size: camera.as_ref().map_or(settings.size, |camera| Some(Size(job::size(settings, camera)))),
-        iterations: None,
-        seconds: None,
-        exposure: None,
-        tonemap: None,
-        camera: settings.camera.clone().filter(|_| camera.is_none()),
-        materials: vec![],
-        scene_lights: vec![],
-        ..without_defaults(settings)
-    };
-    (rest, camera.map(|camera| camera.pack(1, 1)))
+/// What the estimate depends on, but for the changes to materials and lights; none of settings that cannot be rendered.
+fn rendered(opened: &Opened, settings: &Settings) -> Option<(Settings, Params, layout::Camera)> {
+    let mut camera = settings.camera_of(&opened.loaded.scene.cameras).ok()?;
+    if camera.aperture_radius == 0.0 {
+        camera.focus_distance = 1.0;
+    }
+    let params = job::params(settings, &InputArgs::default(), &camera).ok()?;
+    let of_scene = Settings { materials: vec![], scene_lights: vec![], ..of_scene(settings) };
+    Some((of_scene, params, camera.pack(1, 1)))
 }
 
 /// Whether the changes to materials and lights come to the same.
 fn is_changed_alike(scene: &Scene, before: &Settings, now: &Settings) -> bool {
     let changed = |settings: &Settings| {
-        let Scene { materials, lights, cameras, .. } = scene;
-        let (materials, lights, cameras) = (materials.clone(), lights.clone(), cameras.clone());
-        // Or it would be given a sky.
-        let environment = Some(Environment::uniform(Vec3::ONE));
-        let mut changed = Scene { materials, lights, cameras, environment, ..Scene::default() };
-        let Settings { materials, scene_lights, .. } = settings.clone();
-        let changes = Settings { materials, scene_lights, ..Settings::default() };
-        changes.apply_to_scene(&mut changed, Path::new("")).ok()?;
-        Some((changed.materials, changed.lights))
+        let (mut materials, mut lights) = (scene.materials.clone(), scene.lights.clone());
+        settings.change_materials_and_lights(&mut materials, &mut lights).ok()?;
+        Some((materials, lights))
     };
     (&before.materials, &before.scene_lights) == (&now.materials, &now.scene_lights)
         || changed(before).is_some_and(|before| Some(before) == changed(now))
-}
-
-/// The same, with nothing in the place of the defaults.
-fn without_defaults(settings: &Settings) -> Settings {
-    /// None if it is the default.
-    fn other<T: Copy + PartialEq>(value: Option<T>, default: T) -> Option<T> {
-        value.filter(|value| *value != default)
-    }
-    let params = Params::new(1, 1);
-    Settings {
-        photons: other(settings.photons, Count(params.n_paths)),
-        alpha: other(settings.alpha, params.alpha),
-        radius: other(settings.radius, FirstRadius::default()),
-        kernel: other(settings.kernel, Kernel::default()),
-        direct: other(settings.direct, Direct::default()),
-        index: other(settings.index, Index::default()),
-        accel: other(settings.accel, Accelerator::default()),
-        seed: other(settings.seed, params.seed),
-        light_scale: other(settings.light_scale, 1.0),
-        ..settings.clone()
-    }
 }
 
 /// Those settings that change the scene or how it is searched: not the camera, not the rest of the estimator's.
@@ -358,6 +319,10 @@ fn of_scene(settings: &Settings) -> Settings {
         tonemap: None,
         max_segments: None,
         camera: None,
-        ..without_defaults(settings)
+        // Nothing in the place of a default.
+        index: settings.index.filter(|&index| index != Index::default()),
+        accel: settings.accel.filter(|&accel| accel != Accelerator::default()),
+        light_scale: settings.light_scale.filter(|&scale| scale != 1.0),
+        ..settings.clone()
     }
 }
