@@ -512,6 +512,17 @@ fn a_scene_without_light_gets_some_and_says_so() {
     fs::write(folder.path().join("bright.toml"), "scene = \"floor.gltf\"\n[environment]\nstrength = 2\n").unwrap();
     let output = sunfleck(folder.path(), words("export bright.toml -o bright.glb"));
     assert!(output.status.success() && folder.path().join("bright.hdr").exists(), "{}", stderr(&output));
+    // Nothing that is read is written over, by whatever flag.
+    fs::write(folder.path().join("sky.toml"), "scene = \"floor.gltf\"\n[environment]\nfile = \"bright.hdr\"\n")
+        .unwrap();
+    for arguments in ["export sky.toml -o bright.glb", "export bright.glb -o ./bright.glb"] {
+        assert_error(&sunfleck(folder.path(), words(arguments)), 2, &["bright.", "is read and to be written"]);
+    }
+    fs::rename(folder.path().join("a.exr"), folder.path().join("sky.exr")).unwrap();
+    for read in ["--env sky.exr", "--set environment.file=sky.exr"] {
+        let arguments = format!("render floor.gltf -o sky.exr {read}");
+        assert_error(&sunfleck(folder.path(), words(&arguments)), 2, &["sky.exr is read and to be written"]);
+    }
 }
 
 #[test]

@@ -247,13 +247,12 @@ pub struct ViewArgs {
 }
 
 /// What `--camera` and `--env` say, each in place of the file's whole table, and the pairs of `--set`, which change it.
-fn over_named(camera: Option<&str>, env: Option<&Path>, set: &[String]) -> Result<Vec<String>, Usage> {
+pub fn over_named(camera: Option<&str>, env: Option<&Path>, set: &[String]) -> Result<Vec<String>, Usage> {
     let mut named = vec![];
     named.extend(camera.map(|name| ("camera", "name", Value::from(name))));
     if let Some(path) = env {
         // The settings file may lie elsewhere.
-        let absolute = std::path::absolute(path).map_err(|e| Usage(format!("--env: {e}")))?;
-        let file = absolute.to_str().ok_or_else(|| Usage(format!("--env {}: is not UTF-8", path.display())))?;
+        let file = crate::scenes::absolute(path).map_err(|e| Usage(format!("--env {e:#}")))?;
         named.push(("environment", "file", Value::from(file)));
     }
     let mut pairs = vec![];

@@ -11,7 +11,7 @@ use sunfleck::scene::load::Loaded;
 use sunfleck::scene::{Camera, Scene, Settings, settings};
 
 use crate::cli::{InputArgs, RenderArgs, Usage};
-use crate::scenes::{Source, place};
+use crate::scenes::{Source, same_file};
 
 /// Where nothing is said: as many iterations as look good on the shipped scenes, but no longer than one waits for.
 const DEFAULT_ITERATIONS: u32 = 256;
@@ -69,6 +69,9 @@ impl Job {
         check_outputs(args)?;
         let mut source = Source::resolve(&scene_name)?;
         source.set(&args.pairs()?)?;
+        for path in args.output.iter().chain(&args.json) {
+            source.check_not_read(path)?;
+        }
         let settings = &source.settings;
         let iterations = args.iterations.or(settings.iterations.map(|n| n.0));
         let budget = match (iterations, args.seconds.or(settings.seconds)) {
@@ -210,7 +213,7 @@ fn of_flag(why: String) -> Usage {
     Usage(format!("-o {why}"))
 }
 
-/// Refuses what could not be written later, or would overwrite what is read.
+/// Refuses what could not be written later.
 fn check_outputs(args: &RenderArgs) -> Result<()> {
     if args.output.is_empty() && args.json.is_none() {
         bail!(Usage("nowhere to put the picture: add -o out.png or -o out.exr".into()));
@@ -223,20 +226,11 @@ fn check_outputs(args: &RenderArgs) -> Result<()> {
         if files[..i].iter().any(|other| same_file(other, path)) {
             bail!(Usage(format!("{} is to be written twice", path.display())));
         }
-        let scene = args.scene.as_ref().map(PathBuf::from);
-        if scene.iter().chain(&args.env).any(|input| input.is_file() && same_file(input, path)) {
-            bail!(Usage(format!("{} is read and to be written", path.display())));
-        }
     }
     for path in files {
         atomic::check(path)?;
     }
     Ok(())
-}
-
-fn same_file(a: &Path, b: &Path) -> bool {
-    let place = |path: &Path| path.canonicalize().ok().or_else(|| place(path));
-    a == b || place(a).is_some_and(|a| place(b).is_some_and(|b| a == b))
 }
 
 /// Refuses a picture or a number of photons that this machine has no room for.

@@ -81,6 +81,17 @@ impl Source {
         }
     }
 
+    /// Refuses to write over a file that the scene is made from: settings, scene, environment.
+    pub fn check_not_read(&self, path: &Path) -> Result<(), Usage> {
+        let environment = self.settings.environment.as_ref().and_then(|environment| environment.file.as_ref());
+        let environment = environment.map(|file| self.folder.join(file));
+        let read = [Some(PathBuf::from(&self.name)), Some(self.file.clone()), environment];
+        match read.iter().flatten().any(|read| read.is_file() && same_file(read, path)) {
+            true => Err(Usage(format!("{} is read and to be written", path.display()))),
+            false => Ok(()),
+        }
+    }
+
     /// Reads the scene as its file has it, or makes a shipped one; with what was not honoured.
     pub fn scene(&self) -> Result<Loaded> {
         if let Some(scene) = is_shipped(&self.file).then(|| shipped(&self.file.to_string_lossy())).flatten() {
@@ -122,6 +133,13 @@ impl Source {
         Ok(())
     }
 
+    /// Reads an environment before settings name it: to see whether it can be read, and so that they are applied quickly.
+    #[cfg(feature = "view")]
+    pub fn keep_environment(&self, path: &Path) -> Result<()> {
+        self.environment(path)?;
+        Ok(())
+    }
+
     /// Reads an environment, unless it was the last one read and its file is as it was.
     fn environment(&self, path: &Path) -> Result<(Environment, Vec<String>), LoadError> {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
@@ -144,6 +162,18 @@ impl Source {
 pub fn place(path: &Path) -> Option<PathBuf> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     Some(folder.canonicalize().ok()?.join(path.file_name()?))
+}
+
+/// Whether both are one file, also where it is not there yet.
+pub fn same_file(a: &Path, b: &Path) -> bool {
+    let place = |path: &Path| path.canonicalize().ok().or_else(|| place(path));
+    a == b || place(a).is_some_and(|a| place(b).is_some_and(|b| a == b))
+}
+
+/// A file as settings can name it, wherever they lie.
+pub fn absolute(path: &Path) -> Result<String> {
+    let absolute = std::path::absolute(path).with_context(|| path.display().to_string())?;
+    absolute.into_os_string().into_string().ok().with_context(|| format!("{}: is not UTF-8", path.display()))
 }
 
 /// Whether `scene` can be anything; if not, says what is near.
@@ -204,6 +234,7 @@ pub fn export(args: &ExportArgs) -> Result<ExitCode> {
     }
     atomic::check(path)?;
     let source = Source::resolve(&args.scene)?;
+    source.check_not_read(path)?;
     let mut loaded = source.scene()?;
     // The soft sky of a scene without light is no part of it: who reads the file gives it the same, if nothing is changed
     // about light.
@@ -220,11 +251,14 @@ pub fn export(args: &ExportArgs) -> Result<ExitCode> {
         eprintln!("sunfleck: warning: {}", crate::one_line(&warning));
     }
     let bytes = glb_bytes(&scene)?;
+    let beside = path.with_extension("hdr");
+    if scene.environment.is_some() {
+        source.check_not_read(&beside)?;
+    }
     atomic::write(path, |writer| writer.write_all(&bytes))?;
     eprintln!("wrote {}", path.display());
     if let Some(mut environment) = scene.environment {
         Arc::make_mut(&mut environment.texels).iter_mut().for_each(|texel| *texel *= environment.strength);
-        let beside = path.with_extension("hdr");
         export::write_environment_hdr(&environment, &beside)?;
         let turned = match environment.rotation {
             0.0 => String::new(),

@@ -56,7 +56,9 @@ impl First {
         };
         // What is typed wrong is said where it was typed.
         if let Some(choice) = &choice {
-            Source::resolve(&choice.name)?.set(&choice.set)?;
+            let mut source = Source::resolve(&choice.name)?;
+            source.set(&choice.set)?;
+            args.output.iter().try_for_each(|path| source.check_not_read(path))?;
         }
         let limits = Limits { iterations: args.iterations, seconds: args.seconds, noise: args.noise };
         Ok(Self { choice, always, limits, output: args.output.clone(), reference: args.reference.clone() })
@@ -116,6 +118,7 @@ pub struct Viewer {
     pub show_help: bool,
     pub keyboard: super::keys::Keyboard,
     pub dialog: Option<files::Dialog>,
+    pub sky: Option<files::Sky>,
     /// To be read.
     reference: Option<PathBuf>,
     pub pick: files::Pick,
@@ -152,6 +155,7 @@ impl Viewer {
             show_help: false,
             keyboard: Default::default(),
             dialog: None,
+            sky: None,
             reference: first.reference,
             pick: Arc::new(files::pick),
             selected: None,
@@ -182,10 +186,15 @@ impl Viewer {
 
     /// Opens a file, or a shipped scene by its name.
     pub fn open(&mut self, name: impl Into<String>) {
+        self.open_with(name, vec![]);
+    }
+
+    /// The same, with `key=value` over its settings.
+    pub fn open_with(&mut self, name: impl Into<String>, set: Vec<String>) {
         if self.editing.is_some() {
             self.previous = self.wanted.scene.clone();
         }
-        self.wanted.scene = Some(Arc::new(Choice { name: name.into(), set: self.always.clone() }));
+        self.wanted.scene = Some(Arc::new(Choice { name: name.into(), set: [set, self.always.clone()].concat() }));
         (self.wanted.settings, self.wanted.reads_again) = (None, false);
         self.wanted.reloads += 1;
     }
@@ -243,6 +252,13 @@ impl Viewer {
         change(&mut settings);
         self.edits.set(what, time, settings);
         self.wanted.settings = Some(Arc::clone(self.edits.now()));
+    }
+
+    /// A change that is a step of its own, whatever is edited before and after.
+    pub fn edit_apart(&mut self, ui: &egui::Ui, what: &'static str, change: impl FnOnce(&mut Settings)) {
+        self.edits.end_step();
+        self.edit_at(ui.input(|i| i.time), what, change);
+        self.edits.end_step();
     }
 
     pub fn undo(&mut self) {

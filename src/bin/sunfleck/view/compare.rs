@@ -131,7 +131,8 @@ fn unfit(reference: &Reference, size: [u32; 2]) -> Option<String> {
     let name = &reference.name;
     if picture.size != size {
         let [w, h] = picture.size;
-        return Some(format!("{name} has {w}×{h} pixels, the picture {width}×{height}: they cannot be compared"));
+        let hint = if w == 2 * h { "; is it an environment? Settings, Environment, Source" } else { "" };
+        return Some(format!("{name} has {w}×{h} pixels, the picture {width}×{height}: they cannot be compared{hint}"));
     }
     let is_whole = picture.crop == [0, 0, width, height];
     (!is_whole).then(|| format!("{name} has only a part of the picture: they cannot be compared"))
@@ -325,7 +326,7 @@ pub fn load(_: &egui::Ui, viewer: &mut Viewer, path: &Path) {
     let (path, set, say) = (path.to_owned(), viewer.engine().referee(), viewer.engine().speaker());
     std::thread::spawn(move || match output::exr::read(&path) {
         Ok(picture) => {
-            let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+            let name = files::name_of(&path).into_owned();
             say(Message::Said(format!("{name} is the reference")));
             set(Reference { name, picture });
         }
@@ -355,6 +356,8 @@ mod tests {
         let why = unfit(&reference([8, 6], [0, 0, 8, 6]), [9, 6]).unwrap();
         assert!(why.contains("far.exr") && why.contains("8×6") && why.contains("9×6"), "{why}");
         assert!(unfit(&reference([8, 6], [1, 0, 8, 6]), [8, 6]).unwrap().contains("part"));
+        assert!(!why.contains("environment"));
+        assert!(unfit(&reference([8, 4], [0, 0, 8, 4]), [8, 6]).unwrap().contains("environment"));
     }
 
     #[test]

@@ -1,13 +1,17 @@
 //! Files: dialogs, dropped files, the clipboard.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 
 use eframe::egui;
 
+use sunfleck::scene::settings::EnvironmentSettings;
+
 use super::app::Viewer;
-use super::engine::{Choice, Message};
+use super::engine::{Choice, Message, catch};
+use crate::cli::Usage;
 
 /// What a dialog was for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,6 +20,7 @@ pub enum Purpose {
     SavePicture,
     SaveSettings,
     Reference,
+    Environment,
 }
 
 /// What came of a dialog.
@@ -38,6 +43,14 @@ pub struct Dialog {
     /// The scene that it was asked for.
     scene: Option<Arc<Choice>>,
     answer: mpsc::Receiver<Answer>,
+}
+
+/// An environment that is being read, for the scene that is open.
+pub struct Sky {
+    scene: Arc<Choice>,
+    /// As the settings name it.
+    file: String,
+    done: mpsc::Receiver<Result<(), String>>,
 }
 
 const SCENES: &[&str] = &["glb", "gltf", "obj", "toml"];
@@ -63,6 +76,10 @@ pub fn pick(purpose: Purpose, name: &str) -> Answer {
             .add_filter("Settings", &["toml"])
             .save_file(),
         Purpose::Reference => dialog.set_title("Open a reference").add_filter("OpenEXR", &["exr"]).pick_file(),
+        Purpose::Environment => dialog
+            .set_title("Open an environment")
+            .add_filter("Latitude-longitude maps", &["hdr", "exr"])
+            .pick_file(),
     };
     match path {
         Some(path) => Answer::File(path),
@@ -113,8 +130,13 @@ fn ask(viewer: &mut Viewer, purpose: Purpose) {
     viewer.dialog = Some(Dialog { purpose, name, scene: viewer.wanted.scene.clone(), answer });
 }
 
-/// Takes the answer of a dialog, if there is one.
+/// Takes what dialogs and threads that read have come to.
 pub fn poll(ui: &egui::Ui, viewer: &mut Viewer) {
+    poll_dialog(ui, viewer);
+    poll_sky(ui, viewer);
+}
+
+fn poll_dialog(ui: &egui::Ui, viewer: &mut Viewer) {
     let Some(dialog) = &viewer.dialog else { return };
     let answer = match dialog.answer.try_recv() {
         Ok(answer) => answer,
@@ -133,9 +155,13 @@ pub fn poll(ui: &egui::Ui, viewer: &mut Viewer) {
             Err(why) => return viewer.say(ui, Message::Error(why)),
         },
     };
-    let is_of_scene = matches!(purpose, Purpose::SavePicture | Purpose::SaveSettings);
-    if is_of_scene && scene != viewer.wanted.scene {
-        let text = format!("{} was not written: the scene it was for has been left", path.display());
+    let left_undone = match purpose {
+        Purpose::SavePicture | Purpose::SaveSettings => Some("written"),
+        Purpose::Environment => Some("read"),
+        Purpose::Open | Purpose::Reference => None,
+    };
+    if let (Some(done), true) = (left_undone, scene != viewer.wanted.scene) {
+        let text = format!("{} was not {done}: the scene it was for has been left", path.display());
         return viewer.say(ui, Message::Error(text));
     }
     match purpose {
@@ -149,6 +175,7 @@ pub fn poll(ui: &egui::Ui, viewer: &mut Viewer) {
         },
         Purpose::SaveSettings => save_settings(ui, viewer, &path),
         Purpose::Reference => super::compare::load(ui, viewer, &path),
+        Purpose::Environment => read_environment(ui, viewer, &path),
     }
 }
 
@@ -158,6 +185,7 @@ fn without_dialog(purpose: Purpose, name: &str) -> Result<(PathBuf, String), Str
     let extension = match purpose {
         Purpose::Open => return Err(format!("{no_dialog}; drop a scene on the window, or: sunfleck view SCENE")),
         Purpose::Reference => return Err(format!("{no_dialog}; drop an .exr on the window, or use --reference")),
+        Purpose::Environment => return Err(format!("{no_dialog}; drop an .hdr on the window, or use --env")),
         Purpose::SavePicture => "exr",
         Purpose::SaveSettings => "toml",
     };
@@ -194,29 +222,85 @@ pub fn ask_reference(viewer: &mut Viewer) {
     ask(viewer, Purpose::Reference);
 }
 
-/// Scenes, settings, reference pictures: the first of each kind, the others are named.
+pub fn ask_environment(viewer: &mut Viewer) {
+    if viewer.opened().is_some() {
+        ask(viewer, Purpose::Environment);
+    }
+}
+
+/// Reads an environment on a thread of its own; the scene that is open has it if that goes well.
+fn read_environment(ui: &egui::Ui, viewer: &mut Viewer, path: &Path) {
+    let Some(opened) = viewer.opened().cloned() else { return };
+    let file = match crate::scenes::absolute(path) {
+        Ok(file) => file,
+        Err(error) => return viewer.say(ui, Message::Error(format!("{error:#}"))),
+    };
+    let (sender, done) = mpsc::channel();
+    let (scene, named, wake) = (Arc::clone(&opened.choice), file.clone(), viewer.wake());
+    std::thread::spawn(move || {
+        let read = catch(|| opened.source.keep_environment(Path::new(&named)));
+        let _ = sender.send(read.and_then(|read| read.map_err(|error| crate::one_line(&crate::chain(&error)))));
+        wake();
+    });
+    viewer.sky = Some(Sky { scene, file, done });
+}
+
+/// Lights the scene with an environment that has been read.
+fn poll_sky(ui: &egui::Ui, viewer: &mut Viewer) {
+    let Some(sky) = &viewer.sky else { return };
+    let read = match sky.done.try_recv() {
+        Ok(read) => read,
+        Err(mpsc::TryRecvError::Empty) => return,
+        Err(mpsc::TryRecvError::Disconnected) => Err(format!("{}: cannot be read", sky.file)),
+    };
+    let Some(Sky { scene, file, .. }) = viewer.sky.take() else { return };
+    if viewer.wanted.scene.as_ref() != Some(&scene) {
+        return;
+    }
+    match read {
+        Ok(()) => {
+            let message = format!("{} is the environment", name_of(Path::new(&file)));
+            let environment = EnvironmentSettings { file: Some(file), ..EnvironmentSettings::default() };
+            viewer.edit_apart(ui, "environment", |s| s.environment = Some(environment));
+            viewer.say(ui, Message::Said(message));
+        }
+        Err(why) => viewer.say(ui, Message::Error(why)),
+    }
+}
+
+/// Scenes, settings, reference pictures, environments: the first of each kind, the others are named.
 pub fn dropped(ui: &egui::Ui, viewer: &mut Viewer, paths: &[PathBuf]) {
     let extension = |path: &Path| path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    let is_reference = |path: &&PathBuf| extension(path).as_deref() == Some("exr");
-    let is_scene = |path: &&PathBuf| extension(path).is_some_and(|e| SCENES.contains(&e.as_str()));
+    let is = |path: &&PathBuf, all: &[&str]| extension(path).is_some_and(|e| all.contains(&e.as_str()));
     let names = |paths: &[&PathBuf]| paths.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join(", ");
-    let (references, rest): (Vec<_>, Vec<_>) = paths.iter().partition(is_reference);
-    let (scenes, unknown): (Vec<_>, Vec<_>) = rest.into_iter().partition(is_scene);
+    let (references, rest): (Vec<_>, Vec<_>) = paths.iter().partition(|path| is(path, &["exr"]));
+    let (environments, rest): (Vec<_>, Vec<_>) = rest.into_iter().partition(|path| is(path, &["hdr"]));
+    let (scenes, unknown): (Vec<_>, Vec<_>) = rest.into_iter().partition(|path| is(path, SCENES));
     if let Some(path) = references.first() {
         super::compare::load(ui, viewer, path);
     }
-    if let Some(path) = scenes.first() {
-        viewer.open(path.to_string_lossy());
+    let environment = environments.first().map(|path| path.as_path());
+    match (scenes.first(), environment) {
+        (Some(scene), _) => match crate::cli::over_named(None, environment, &[]) {
+            Ok(set) => viewer.open_with(scene.to_string_lossy(), set),
+            Err(Usage(why)) => viewer.say(ui, Message::Error(why)),
+        },
+        (None, Some(path)) if viewer.opened().is_some() => read_environment(ui, viewer, path),
+        (None, Some(path)) => {
+            let text = format!("{}: the environment of which scene? open one first", path.display());
+            viewer.say(ui, Message::Error(text));
+        }
+        (None, None) => {}
     }
-    for (what, all) in [("reference", &references), ("scene", &scenes)] {
+    for (what, all) in [("reference", &references), ("environment", &environments), ("scene", &scenes)] {
         if all.len() > 1 {
             viewer.say(ui, Message::Warning(format!("{}: left out, one {what} at a time", names(&all[1..]))));
         }
     }
     if !unknown.is_empty() {
         let name = names(&unknown);
-        let text = format!("{name}: neither a scene (.glb, .gltf, .obj, .toml) nor a reference (.exr)");
-        viewer.say(ui, Message::Error(text));
+        let kinds = "a scene (.glb, .gltf, .obj, .toml), a reference (.exr) or an environment (.hdr)";
+        viewer.say(ui, Message::Error(format!("{name}: not {kinds}")));
     }
 }
 
@@ -251,6 +335,11 @@ pub fn screenshot(ui: &egui::Ui, viewer: &Viewer) {
         });
     };
     ui.ctx().send_viewport_cmd(egui::ViewportCommand::Screenshot(egui::ScreenshotCallback::new(write)));
+}
+
+/// A file's name without its folder.
+pub fn name_of(path: &Path) -> Cow<'_, str> {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy()
 }
 
 /// In `folder`, not there yet.

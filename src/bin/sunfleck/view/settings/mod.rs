@@ -60,11 +60,9 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer) {
 }
 
 impl Viewer {
-    /// Changes settings back: a step of its own.
+    /// Changes settings back.
     fn reset(&mut self, ui: &Ui, change: impl FnOnce(&mut Settings)) {
-        self.edits.end_step();
-        self.edit_at(ui.input(|i| i.time), "reset", change);
-        self.edits.end_step();
+        self.edit_apart(ui, "reset", change);
     }
 
     /// The settings, for a panel to look at while it changes them.

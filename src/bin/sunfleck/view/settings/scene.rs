@@ -1,5 +1,7 @@
 //! What is lit, and by what: environment, the selected material, lights.
 
+use std::path::Path;
+
 use eframe::egui;
 use egui::Ui;
 use glam::Vec3;
@@ -8,10 +10,12 @@ use sunfleck::scene::{PunctualKind, PunctualLight, Scene};
 
 use super::color::color;
 use super::number::{Number, drag_sized, log_slider, slider};
-use super::widgets::{Name, back, row};
+use super::widgets::{Name, back, choice, row};
 use crate::view::app::Viewer;
+use crate::view::files::{self, name_of};
 
-const SOURCE: Name = Name { name: "Source", hint: "Where the light from infinitely far away comes from." };
+const SOURCE: Name =
+    Name { name: "Source", hint: "Where the light from infinitely far away comes from. Restarts the estimate." };
 const ROTATION: Name = Name {
     name: "Rotation",
     hint: "Turns the environment about the y axis, counter-clockwise seen from above, degrees. Restarts the estimate.",
@@ -25,6 +29,15 @@ const SCALE: Name = Name {
     name: "Light scale",
     hint: "Factor on every light: lamps, glowing surfaces, environment. Restarts the estimate.",
 };
+/// What is chosen for it.
+#[derive(Clone, Copy, PartialEq)]
+enum Source {
+    /// As it is.
+    Now,
+    File,
+    Color,
+}
+
 /// What shines from all around.
 enum Sky {
     File(String),
@@ -54,26 +67,39 @@ pub fn environment(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     let was = read.environment.clone().unwrap_or_default();
     let given = now.environment.clone().unwrap_or_default();
     let is_other = (&given.file, given.color.is_some()) != (&was.file, was.color.is_some());
+    let mut source = Source::Now;
     let reset = row(ui, SOURCE, is_other, |ui| {
         let text = match &sky {
-            Sky::File(file) => file,
+            Sky::File(file) => &name_of(Path::new(file)),
             Sky::Color(_) => "one colour",
             Sky::Own { .. } => "the scene's own",
             Sky::Default => "a soft sky, as the scene comes without light",
             Sky::None => "none",
         };
-        ui.add(egui::Label::new(text).truncate())
+        let sources = [
+            (Source::Now, text, "As it is"),
+            (Source::File, "A map …", "A latitude-longitude map: .hdr or .exr. An .hdr can also be dropped on the window."),
+            (Source::Color, "One colour", "The same light from everywhere"),
+        ];
+        let response = choice(ui, "source", &mut source, &sources);
+        match &sky {
+            Sky::File(file) => response.on_hover_text(file),
+            _ => response,
+        }
     });
+    match source {
+        Source::Now => {}
+        Source::File => files::ask_environment(viewer),
+        Source::Color if matches!(sky, Sky::Color(_)) => {}
+        Source::Color => {
+            let grey = EnvironmentSettings { color: Some([0.5; 3]), ..EnvironmentSettings::default() };
+            viewer.edit_apart(ui, "environment", |s| s.environment = Some(grey));
+        }
+    }
     if reset {
         viewer.reset(ui, |s| s.environment = read.environment.clone());
-        return;
     }
-    if matches!(sky, Sky::None) {
-        let hint = "The same light from everywhere. Restarts the estimate.";
-        if ui.button("Add one colour all around").on_hover_text(hint).clicked() {
-            let grey = EnvironmentSettings { color: Some([0.5; 3]), ..EnvironmentSettings::default() };
-            viewer.edit(ui, "environment", |s| s.environment = Some(grey));
-        }
+    if reset || source != Source::Now || matches!(sky, Sky::None) {
         return;
     }
     if let Sky::Color(mut radiance) = sky {

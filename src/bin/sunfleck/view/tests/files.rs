@@ -1,12 +1,19 @@
 //! Files that come from outside, dialogs that are not there, and the picture on the screen.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use eframe::egui;
 use egui::{Key, Modifiers};
 
+use sunfleck::scene::Environment;
+use sunfleck::scene::export::write_environment_hdr;
+
 use super::Window;
+use crate::view::app::Viewer;
 use crate::view::files::Answer;
+
+const QUAD: &str = "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nf 4 3 2 1\n";
 
 #[test]
 fn files_dropped_at_once_are_each_taken_or_named() {
@@ -16,10 +23,68 @@ fn files_dropped_at_once_are_each_taken_or_named() {
     window.wait_for_message("saved ");
     std::fs::write(&scene, "scene = \"cornell\"\nsize = [16, 12]\nphotons = 200\n").unwrap();
     window.drop_files(["readme.txt".into(), picture, scene, second]);
-    assert!(window.shows("readme.txt: neither a scene") && window.shows("second.toml: left out"));
+    assert!(window.shows("readme.txt: not a scene") && window.shows("second.toml: left out"));
     window.wait("both", |viewer| {
         viewer.now.reference.is_some() && viewer.now.painted.as_ref().is_some_and(|painted| painted.size == [16, 12])
     });
+}
+
+/// Writes a sky of one radiance.
+fn write_sky(path: &Path, radiance: f32) {
+    write_environment_hdr(&Environment::uniform(glam::Vec3::splat(radiance)), path).unwrap();
+}
+
+/// The file that the settings name.
+fn environment(viewer: &Viewer) -> Option<&Path> {
+    viewer.edits.now().environment.as_ref()?.file.as_deref().map(Path::new)
+}
+
+#[test]
+fn an_environment_lights_the_scene_that_is_open() {
+    let mut window = Window::new(None);
+    let [dropped, chosen, broken] = ["a sky.hdr", "sky.hdr", "broken.hdr"].map(|name| window.path(name));
+    write_sky(&dropped, 1.0);
+    write_sky(&chosen, 8.0);
+    std::fs::write(&broken, "#?RADIANCE\n").unwrap();
+    window.drop_file(dropped.clone());
+    assert!(window.shows("a sky.hdr: the environment of which scene?"));
+    let scene = window.path("quad.toml");
+    std::fs::write(window.path("quad.obj"), QUAD).unwrap();
+    std::fs::write(&scene, "scene = \"quad.obj\"\nsize = [32, 24]\nphotons = 500\n").unwrap();
+    window.drop_file(scene.clone());
+    window.wait_for_picture();
+    let mean = |window: &mut Window| {
+        window.wait("picture in this light", |viewer| {
+            viewer.now.frame.as_ref().is_some_and(|frame| frame.settings.environment == viewer.edits.now().environment)
+        });
+        window.wait_for_picture();
+        let picture = window.viewer().now.frame.as_ref().unwrap().picture();
+        picture.rgb.iter().map(|rgb| rgb[0]).sum::<f32>() / picture.rgb.len() as f32
+    };
+    let before = mean(&mut window);
+    window.drop_file(dropped.clone());
+    window.wait("environment", |viewer| environment(viewer) == Some(&dropped));
+    let lit = mean(&mut window);
+    // What cannot be read changes nothing.
+    window.drop_file(broken);
+    window.wait_for_message("broken.hdr");
+    assert_eq!(environment(window.viewer()), Some(dropped.as_path()));
+    window.activate("Environment");
+    window.activate("Source");
+    window.click("A map …");
+    window.wait("other environment", |viewer| environment(viewer) == Some(&chosen));
+    let brighter = mean(&mut window);
+    assert!((brighter / lit - 8.0).abs() < 0.1, "{brighter} {lit}");
+    for expected in [Some(dropped.as_path()), None] {
+        window.press(Modifiers::COMMAND, Key::Z);
+        assert_eq!(environment(window.viewer()), expected);
+    }
+    assert_eq!(mean(&mut window), before);
+    // Both at once.
+    window.viewer().close_scene();
+    window.drop_files([dropped.clone(), scene]);
+    window.wait("scene and environment", |viewer| environment(viewer) == Some(&dropped));
+    assert_eq!(mean(&mut window), lit);
 }
 
 #[test]

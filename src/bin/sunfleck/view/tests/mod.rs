@@ -200,6 +200,7 @@ fn file_of(purpose: Purpose) -> &'static str {
         Purpose::SavePicture => "picture.exr",
         Purpose::SaveSettings => "settings.toml",
         Purpose::Reference => "reference.exr",
+        Purpose::Environment => "sky.hdr",
     }
 }
 
