@@ -76,10 +76,9 @@ pub fn pick(purpose: Purpose, name: &str) -> Answer {
             .add_filter("Settings", &["toml"])
             .save_file(),
         Purpose::Reference => dialog.set_title("Open a reference").add_filter("OpenEXR", &["exr"]).pick_file(),
-        Purpose::Environment => dialog
-            .set_title("Open an environment")
-            .add_filter("Latitude-longitude maps", &["hdr", "exr"])
-            .pick_file(),
+        Purpose::Environment => {
+            dialog.set_title("Open an environment").add_filter("Latitude-longitude maps", &["hdr", "exr"]).pick_file()
+        }
     };
     match path {
         Some(path) => Answer::File(path),

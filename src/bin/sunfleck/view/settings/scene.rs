@@ -78,7 +78,7 @@ pub fn environment(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
         };
         let sources = [
             (Source::Now, text, "As it is"),
-            (Source::File, "A map …", "A latitude-longitude map: .hdr or .exr. An .hdr can also be dropped on the window."),
+            (Source::File, "A map …", "Latitude-longitude, .hdr or .exr; an .hdr can be dropped, too"),
             (Source::Color, "One colour", "The same light from everywhere"),
         ];
         let response = choice(ui, "source", &mut source, &sources);
