@@ -22,6 +22,19 @@ pub enum DeviceKind {
     Other,
 }
 
+impl DeviceKind {
+    /// What is chosen first if nothing else is said; of the same, the first in the list.
+    fn rank(self) -> u32 {
+        match self {
+            Self::Discrete => 0,
+            Self::Virtual => 1,
+            Self::Integrated => 2,
+            Self::Other => 3,
+            Self::Cpu => 4,
+        }
+    }
+}
+
 impl std::fmt::Display for DeviceKind {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
@@ -87,14 +100,14 @@ impl std::fmt::Display for DeviceInfo {
 /// Which adapter to use.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Choice {
-    /// Hardware, or nothing.
+    /// The best hardware, or nothing: a card, a part of one, graphics in the processor, in this order.
     Real,
-    /// Hardware if there is any, else software.
+    /// The same, or else software.
     #[default]
     Any,
     /// By [`DeviceInfo::index`].
     Index(usize),
-    /// The first, hardware before software, whose name contains this, whatever the case.
+    /// The best whose name contains this, whatever the case.
     Name(String),
 }
 
@@ -210,8 +223,7 @@ impl Context {
             let names: Vec<String> = list_devices().iter().map(|d| format!("{}: {d}", d.index)).collect();
             if names.is_empty() { "there is none".to_owned() } else { format!("there are {}", names.join("; ")) }
         };
-        // Hardware before software, else in the order of the list.
-        found.sort_by_key(|(info, _)| (!info.is_real(), info.index));
+        found.sort_by_key(|(info, _)| (info.kind.rank(), info.index));
         let wanted = |info: &DeviceInfo| match choice {
             Choice::Real => info.is_real(),
             Choice::Any => true,
