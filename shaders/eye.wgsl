@@ -14,7 +14,7 @@ fn balance(pdf: f32, light_pdf: f32) -> f32 {
     return select(1.0, pdf / (pdf + light_pdf), pdf > 0.0);
 }
 
-// Writes eye_vertices; one thread per pixel of the chunk. values: pixels in the chunk, first pixel.
+// Writes eye_vertices; one thread per pixel of the chunk. values: rows in the chunk, first row, elements to skip.
 @compute @workgroup_size(64)
 fn trace_eye(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -25,7 +25,7 @@ fn trace_eye(
     if xy.x >= frame.width || xy.y >= arguments.values.x {
         return;
     }
-    let index = xy.y * frame.width + xy.x;
+    let index = arguments.values.z + xy.y * frame.width + xy.x;
     xy.y += arguments.values.y;
     let pixel = (frame.crop_y + xy.y) * frame.full_width + frame.crop_x + xy.x;
     var rng = rng_new(STREAM_EYE, pixel, frame.iteration, frame.seed);

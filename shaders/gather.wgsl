@@ -63,7 +63,7 @@ fn visit(visitor: ptr<function, Visitor>, slot: u32, delta: vec3<f32>, distance2
 }
 
 // Reads eye_vertices, first_radii, photons and tree, writes radiance; one thread per pixel of the chunk.
-// values: rows in the chunk, photons, levels of the tree.
+// values: rows in the chunk, photons, levels of the tree, elements to skip.
 @compute @workgroup_size(64)
 fn gather(
     @builtin(workgroup_id) workgroup: vec3<u32>,
@@ -74,7 +74,7 @@ fn gather(
     if xy.x >= frame.width || xy.y >= arguments.values.x {
         return;
     }
-    let pixel = xy.y * frame.width + xy.x;
+    let pixel = arguments.values.w + xy.y * frame.width + xy.x;
     let vertex = eye_vertices[pixel];
     if (vertex.flags & EYE_GATHER) == 0u {
         radiance[pixel] = vec4(vertex.radiance, 0.0);

@@ -67,9 +67,14 @@ pub(super) struct Index {
     pub(super) nodes: Array,
     /// [`levels`] of the last build.
     pub(super) levels: Vec<[u32; 2]>,
+    /// Parts of the sort, of [`Index::N_PARTS`], between two chances of an interrupt.
+    pub(super) parts_at_once: u32,
 }
 
 impl Index {
+    /// Of a sort: each pass over a digit, and the move of the records; the tree besides counts as one.
+    pub(super) const N_PARTS: u32 = N_PASSES + 2;
+
     pub(super) fn new(modules: &Modules<'_>, sorted: &Sorted) -> Result<Self, Error> {
         use Access::{Read, Write};
         let bounds = [Read, Write, Write];
@@ -96,6 +101,7 @@ impl Index {
             boxes: Array::new::<PointBox>("boxes of the tree over points"),
             nodes: Array::new::<TreeNode>("tree over points"),
             levels: Vec::new(),
+            parts_at_once: 1,
         })
     }
 
@@ -183,15 +189,23 @@ impl Index {
                 self.totals.all(),
             ];
             let arguments = [n, pass * DIGIT_BITS, n_sorted, self.keys_a_thread];
-            batch.cut_if_interruptible()?;
+            self.cut(batch, pass)?;
             batch.dispatch(&self.sort_count, &buffers, arguments, n_sorted);
             batch.dispatch(&self.sort_scan, &buffers, arguments, 1 << DIGIT_BITS);
             batch.dispatch(&self.sort_scatter, &buffers, arguments, n_sorted);
         }
         let last = (N_PASSES % 2) as usize;
         let buffers = [self.order[last].all(), records.clone(), sorted.all()];
-        batch.cut_if_interruptible()?;
+        self.cut(batch, N_PASSES)?;
         batch.dispatch(&self.permute, &buffers, [n, words, 0, 0], groups);
+        Ok(())
+    }
+
+    /// Before a part of the sort, if an interrupt asks for it.
+    fn cut(&self, batch: &mut Batch<'_>, part: u32) -> Result<(), Error> {
+        if part.is_multiple_of(self.parts_at_once) {
+            batch.cut_if_interruptible(0)?;
+        }
         Ok(())
     }
 

@@ -2,7 +2,8 @@
 
 use std::collections::HashMap;
 use std::num::NonZeroU64;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 use bytemuck::{Pod, Zeroable};
 
@@ -117,8 +118,28 @@ pub(super) struct Shared {
     groups: Vec<Group>,
     /// What [`Batch::cut`] asks.
     pub(super) interrupt: Interrupt,
-    /// What the device was given last, if there is an interrupt.
-    submitted: Mutex<Option<wgpu::SubmissionIndex>>,
+    queue: Mutex<Queue>,
+}
+
+/// What is known of the device's queue.
+struct Queue {
+    /// What it was given last.
+    last: Option<Submitted>,
+    /// When it was last known to have come to the end of something.
+    reached: Instant,
+}
+
+struct Submitted {
+    index: wgpu::SubmissionIndex,
+    when: Instant,
+    amount: u32,
+}
+
+/// How long something that was submitted took.
+pub(super) struct Took {
+    /// Of what it did, as [`Batch::cut`] was told.
+    pub(super) amount: u32,
+    pub(super) seconds: f64,
 }
 
 impl Shared {
@@ -133,12 +154,20 @@ impl Shared {
         let binding = (uniform(size_of::<Arguments>() as u64, true), wgpu::BindingResource::Buffer(window));
         let mut groups = vec![Group::new(context, "arguments", &[binding])];
         groups.extend(further);
-        Self { arguments, groups, interrupt: Interrupt::default(), submitted: Mutex::default() }
+        let queue = Mutex::new(Queue { last: None, reached: Instant::now() });
+        Self { arguments, groups, interrupt: Interrupt::default(), queue }
     }
 
-    /// Notes what was submitted; what was before it.
-    fn follows(&self, submission: wgpu::SubmissionIndex) -> Option<wgpu::SubmissionIndex> {
-        self.submitted.lock().unwrap_or_else(std::sync::PoisonError::into_inner).replace(submission)
+    fn queue(&self) -> MutexGuard<'_, Queue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Waits until the device has done what it was given before the last.
+    fn wait_for(&self, context: &Context, before: Submitted) -> Result<Took, Error> {
+        context.wait_for(before.index)?;
+        let now = Instant::now();
+        let began = std::mem::replace(&mut self.queue().reached, now).max(before.when);
+        Ok(Took { amount: before.amount, seconds: (now - began).as_secs_f64() })
     }
 }
 
@@ -168,7 +197,7 @@ impl<'a> Modules<'a> {
         name: &'static str,
         bindings: &[impl Copy + Into<wgpu::BindingType>],
     ) -> Result<Arc<Kernel>, Error> {
-        let mut known = self.context.kernels.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut known = self.context.kernels.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(kernel) = known.get(&(module, name)) {
             return Ok(Arc::clone(kernel));
         }
@@ -310,30 +339,29 @@ impl<'a> Batch<'a> {
         pass.dispatch_workgroups(groups.div_ceil(rows), rows, 1);
     }
 
-    /// Hands the device what was recorded so far; more can be recorded. With an interrupt, the device is left with no more
-    /// than this to do, or [`Error::Interrupted`] returned.
-    pub(super) fn cut(&mut self) -> Result<(), Error> {
+    /// Hands the device what was recorded so far, `amount` of something; more can be recorded. The device is left with no
+    /// more than this to do, or [`Error::Interrupted`] returned. Returns how long what was before it took.
+    pub(super) fn cut(&mut self, amount: u32) -> Result<Option<Took>, Error> {
         let next = encoder(self.context, self.label);
         let recorded = std::mem::replace(&mut self.encoder, next);
-        let before = hand_over(self.context, self.shared, recorded, &self.arguments);
+        let before = hand_over(self.context, self.shared, recorded, &self.arguments, amount);
         self.arguments.clear();
         self.context.check()?;
         self.shared.interrupt.check()?;
-        if let Some(before) = before {
-            self.context.wait_for(before)?;
-            self.shared.interrupt.check()?;
-        }
-        Ok(())
+        let Some(before) = before else { return Ok(None) };
+        let took = self.shared.wait_for(self.context, before)?;
+        self.shared.interrupt.check()?;
+        Ok(Some(took))
     }
 
     /// [`Batch::cut`] where only an interrupt asks for it.
-    pub(super) fn cut_if_interruptible(&mut self) -> Result<(), Error> {
-        if self.shared.interrupt.is_set() { self.cut() } else { Ok(()) }
+    pub(super) fn cut_if_interruptible(&mut self, amount: u32) -> Result<Option<Took>, Error> {
+        if self.shared.interrupt.is_set() { self.cut(amount) } else { Ok(None) }
     }
 
     /// Hands it all to the device.
     pub(super) fn submit(self) -> Result<(), Error> {
-        hand_over(self.context, self.shared, self.encoder, &self.arguments);
+        hand_over(self.context, self.shared, self.encoder, &self.arguments, 0);
         if let Some(error) = self.scopes.first() {
             return Err(self.context.error(error.to_string()));
         }
@@ -341,18 +369,20 @@ impl<'a> Batch<'a> {
     }
 }
 
-/// Returns what was submitted before, if there is an interrupt.
+/// Returns what was submitted before.
 fn hand_over(
     context: &Context,
     shared: &Shared,
     recorded: wgpu::CommandEncoder,
     arguments: &[u8],
-) -> Option<wgpu::SubmissionIndex> {
+    amount: u32,
+) -> Option<Submitted> {
     if !arguments.is_empty() {
         context.queue.write_buffer(&shared.arguments, 0, arguments);
     }
-    let submission = context.queue.submit([recorded.finish()]);
-    if shared.interrupt.is_set() { shared.follows(submission) } else { None }
+    let when = Instant::now();
+    let index = context.queue.submit([recorded.finish()]);
+    shared.queue().last.replace(Submitted { index, when, amount })
 }
 
 fn encoder(context: &Context, label: &str) -> wgpu::CommandEncoder {

@@ -22,7 +22,7 @@ fn on_the_cpu() -> CpuStages {
     CpuStages::new(PackedScene::new(&scene).into(), scene.cameras[0].pack(SIZE[0], SIZE[1]), SIZE)
 }
 
-/// With dispatches as small as can be, from the second iteration on.
+/// With dispatches as small as can be.
 fn on_the_gpu() -> Option<GpuStages> {
     let scene = everything();
     let camera = scene.cameras[0].pack(SIZE[0], SIZE[1]);

@@ -1,11 +1,13 @@
 //! The stages of an iteration on a GPU.
 
+mod pace;
 mod photons;
 mod probe;
 mod scene;
 
 use std::sync::Arc;
 
+use pace::Pace;
 use photons::PhotonPaths;
 pub use probe::{BsdfAnswer, BsdfQuery};
 use scene::SceneBuffers;
@@ -26,18 +28,17 @@ use crate::scene::PackedScene;
 const THREADS: u32 = 64;
 /// Words of a photon, whose position comes first.
 const PHOTON_WORDS: u32 = (size_of::<Photon>() / 4) as u32;
-/// The film is cut at multiples of this many pixels, so that the address of any part of a per-pixel array is aligned.
+/// The address of any part of a per-pixel array that begins at a multiple of this many pixels is aligned.
 const ALIGNED_PIXELS: u32 = 64;
-/// And at multiples of this many rows: a workgroup's.
+/// The film is cut at multiples of this many rows: a workgroup's.
 const TILE: u32 = 8;
-/// Pixels of the first dispatches, before anything is known about the device's speed.
-const FIRST_CHUNK: u32 = 65536;
 /// Pixels of the largest dispatches: 112 bytes each have to fit a binding.
 const MOST_PIXELS: u32 = 1 << 19;
 /// Seconds a dispatch may take unless the caller says, well below what watchdogs allow.
 const DISPATCH_SECONDS: f64 = 0.1;
-/// The same with an interrupt, which takes effect between two; whoever shares the device has a turn there.
-const INTERRUPTIBLE_SECONDS: f64 = 0.01;
+/// The same with an interrupt, which takes effect between two; whoever shares the device has a turn there, and two are with
+/// the device at a time.
+const INTERRUPTIBLE_SECONDS: f64 = 0.004;
 
 // The stages that are timed.
 const EYE: usize = 0;
@@ -75,11 +76,11 @@ pub struct GpuStages {
     n_photons: u32,
     film_size: [u32; 2],
     n_iterations: u32,
-    /// Pixels a dispatch of eye paths handles.
-    eye_chunk: u32,
-    /// Pixels a gather dispatch handles.
-    gather_chunk: u32,
-    /// What the chunks are chosen for.
+    /// In pixels.
+    eye_pace: Pace,
+    gather_pace: Pace,
+    /// A photon takes the device to sort, in each part of that; none before the first.
+    photon_seconds: Option<f64>,
     dispatch_seconds: f64,
 }
 
@@ -118,7 +119,7 @@ impl GpuStages {
         };
         let accumulate = modules.kernel("accumulate", "accumulate", &[Read, Write])?;
         let timer = Timer::new(&context);
-        Ok(Self {
+        let mut stages = Self {
             context,
             shared,
             scene,
@@ -142,17 +143,28 @@ impl GpuStages {
             n_photons: 0,
             film_size: [0, 0],
             n_iterations: 0,
-            eye_chunk: FIRST_CHUNK,
-            gather_chunk: FIRST_CHUNK,
+            eye_pace: Pace::new(1, MOST_PIXELS),
+            gather_pace: Pace::new(1, MOST_PIXELS),
+            photon_seconds: None,
             dispatch_seconds: DISPATCH_SECONDS,
-        })
+        };
+        stages.begin_paces();
+        Ok(stages)
     }
 
     /// How long one dispatch of eye paths, photon paths or the gather is to take at most, seconds (if never called 0.1, or
-    /// 0.01 with an interrupt): short ones let whoever shares the device have a turn. It is aimed at from what [`Stages::times`] last read, down to
-    /// a smallest dispatch, and changes no bit of the picture.
+    /// 0.004 with an interrupt): short ones let whoever shares the device have a turn. It is aimed at from what those before
+    /// took, down to a smallest dispatch, and changes no bit of the picture.
     pub fn set_dispatch_seconds(&mut self, seconds: f64) {
         self.dispatch_seconds = seconds.max(0.0);
+        self.begin_paces();
+    }
+
+    /// Nothing is known of what is next.
+    fn begin_paces(&mut self) {
+        for pace in [&mut self.eye_pace, &mut self.gather_pace, &mut self.paths.pace] {
+            pace.begin(self.dispatch_seconds);
+        }
     }
 
     /// Room for the film's pixels.
@@ -162,14 +174,6 @@ impl GpuStages {
         }
         self.n_pixels = n;
         Ok(())
-    }
-
-    /// Parts of the film of about `chunk` pixels: first row and number of rows.
-    fn chunks(frame: &Frame, chunk: u32) -> impl Iterator<Item = (u32, u32)> + use<> {
-        let height = frame.height;
-        let step = (ALIGNED_PIXELS >> frame.width.trailing_zeros().min(ALIGNED_PIXELS.ilog2())).max(TILE);
-        let rows = (chunk / frame.width.max(1)).next_multiple_of(step).max(step);
-        (0..height).step_by(rows as usize).map(move |first| (first, rows.min(height - first)))
     }
 
     /// The boxes of the tree, all levels, leaves first; none where ray queries search.
@@ -206,9 +210,42 @@ impl GpuStages {
     }
 }
 
-/// Workgroups for a part of the film.
-fn tiles(width: u32, rows: u32) -> u32 {
-    width.div_ceil(TILE) * rows.div_ceil(TILE)
+/// Some rows of the film.
+struct Rows {
+    first: u32,
+    n: u32,
+    width: u32,
+}
+
+impl Rows {
+    /// Those from `first` on, of some `amount` pixels; none at the end of the film.
+    fn new(frame: &Frame, first: u32, amount: u32) -> Option<Self> {
+        let n = (amount / frame.width.max(1)).next_multiple_of(TILE).max(TILE);
+        (first < frame.height).then(|| Self { first, n: n.min(frame.height - first), width: frame.width })
+    }
+
+    /// The next ones.
+    fn end(&self) -> u32 {
+        self.first + self.n
+    }
+
+    fn pixels(&self) -> u32 {
+        self.n * self.width
+    }
+
+    fn workgroups(&self) -> u32 {
+        self.width.div_ceil(TILE) * self.n.div_ceil(TILE)
+    }
+
+    /// Pixels at the beginning of [`Rows::of`] that are of the rows before.
+    fn skipped(&self) -> u32 {
+        self.first * self.width % ALIGNED_PIXELS
+    }
+
+    /// Their part of a per-pixel array, and what is [`Rows::skipped`].
+    fn of<'a>(&self, array: &'a Array) -> wgpu::BindingResource<'a> {
+        array.range(self.first * self.width - self.skipped(), self.pixels() + self.skipped())
+    }
 }
 
 /// What can be read back.
@@ -238,12 +275,13 @@ impl Stages for GpuStages {
         self.n_pixels = 0;
         self.film_size = [0, 0];
         self.n_iterations = 0;
+        self.begin_paces();
         self.context.check()
     }
 
     fn set_interrupt(&mut self, interrupt: Interrupt) {
         if interrupt.is_set() {
-            self.dispatch_seconds = self.dispatch_seconds.min(INTERRUPTIBLE_SECONDS);
+            self.set_dispatch_seconds(self.dispatch_seconds.min(INTERRUPTIBLE_SECONDS));
         }
         self.shared.interrupt = interrupt;
     }
@@ -259,12 +297,15 @@ impl Stages for GpuStages {
         let mut batch = Batch::new(&self.context, &self.shared, "eye");
         self.scene.set_frame(&batch, frame);
         self.timer.begin(EYE, &mut batch);
-        for (first, rows) in Self::chunks(frame, self.eye_chunk) {
-            if first > 0 {
-                batch.cut()?;
+        let mut next = Rows::new(frame, 0, self.eye_pace.amount());
+        while let Some(rows) = next {
+            let buffers = [rows.of(&self.eye_vertices)];
+            let arguments = [rows.n, rows.first, rows.skipped(), 0];
+            batch.dispatch(&self.trace_eye, &buffers, arguments, rows.workgroups());
+            if rows.end() < frame.height {
+                self.eye_pace.learn(batch.cut(rows.pixels())?, self.dispatch_seconds);
             }
-            let buffers = [self.eye_vertices.range(first * frame.width, rows * frame.width)];
-            batch.dispatch(&self.trace_eye, &buffers, [rows, first, 0, 0], tiles(frame.width, rows));
+            next = Rows::new(frame, rows.end(), self.eye_pace.amount());
         }
         self.timer.end(EYE, batch, &self.context)
     }
@@ -279,6 +320,7 @@ impl Stages for GpuStages {
             &mut self.photons,
             &mut self.readback,
             &mut self.timer,
+            self.dispatch_seconds,
         )?;
         Ok(())
     }
@@ -299,6 +341,8 @@ impl Stages for GpuStages {
         self.scene.set_frame(&batch, frame);
         self.timer.begin(BUILD, &mut batch);
         let photons = self.photons.all();
+        let part_seconds = self.photon_seconds.map(|seconds| seconds * f64::from(n));
+        self.index.parts_at_once = part_seconds.map_or(1, |part| ((self.dispatch_seconds / part) as u32).max(1));
         match &mut self.hardware {
             None => self.index.build(&mut batch, n, &photons, PHOTON_WORDS, &self.other_photons)?,
             Some(hardware) => {
@@ -331,20 +375,22 @@ impl Stages for GpuStages {
         let mut batch = Batch::new(&self.context, &self.shared, "gather");
         self.scene.set_frame(&batch, frame);
         self.timer.begin(GATHER, &mut batch);
-        for (first, rows) in Self::chunks(frame, self.gather_chunk) {
-            if first > 0 {
-                batch.cut()?;
-            }
-            let (first, n) = (first * frame.width, rows * frame.width);
+        let mut next = Rows::new(frame, 0, self.gather_pace.amount());
+        while let Some(rows) = next {
             let buffers = [
-                self.eye_vertices.range(first, n),
-                self.first_radii.range(first, n),
+                rows.of(&self.eye_vertices),
+                rows.of(&self.first_radii),
                 self.photons.all(),
                 tree.clone(),
-                self.radiance.range(first, n),
+                rows.of(&self.radiance),
             ];
-            let arguments = self.index.arguments([rows, self.n_photons, self.index.levels.len() as u32, 0]);
-            batch.dispatch(&self.gather, &buffers, arguments, tiles(frame.width, rows));
+            let n_levels = self.index.levels.len() as u32;
+            let arguments = self.index.arguments([rows.n, self.n_photons, n_levels, rows.skipped()]);
+            batch.dispatch(&self.gather, &buffers, arguments, rows.workgroups());
+            if rows.end() < frame.height {
+                self.gather_pace.learn(batch.cut(rows.pixels())?, self.dispatch_seconds);
+            }
+            next = Rows::new(frame, rows.end(), self.gather_pace.amount());
         }
         self.timer.end(GATHER, batch, &self.context)
     }
@@ -357,8 +403,9 @@ impl Stages for GpuStages {
         if frame.iteration <= 1 {
             batch.encoder().clear_buffer(self.film.raw(), 0, None);
         }
-        for (first, rows) in Self::chunks(frame, MOST_PIXELS) {
-            let (first, n) = (first * frame.width, rows * frame.width);
+        let n_pixels = frame.width * frame.height;
+        for first in (0..n_pixels).step_by(MOST_PIXELS as usize) {
+            let n = MOST_PIXELS.min(n_pixels - first);
             let buffers = [self.radiance.range(first, n), self.film.range(first, n)];
             batch.dispatch(&self.accumulate, &buffers, [n, 0, 0, 0], n.div_ceil(THREADS));
         }
@@ -413,13 +460,9 @@ impl Stages for GpuStages {
         let [eye, photons, build, gather, accumulate] =
             self.timer.read(&self.context, &self.shared, &mut self.readback)?;
         let times = StageTimes { eye, photons, build, gather, accumulate };
-        for (seconds, chunk) in [(times.eye, &mut self.eye_chunk), (times.gather, &mut self.gather_chunk)] {
-            if seconds > 0.0 {
-                let n = f64::from(self.n_pixels) * self.dispatch_seconds / seconds;
-                *chunk = n.min(f64::from(MOST_PIXELS)) as u32;
-            }
+        if self.n_photons > 0 && times.build > 0.0 {
+            self.photon_seconds = Some(times.build / f64::from(self.n_photons * Index::N_PARTS));
         }
-        self.paths.fit(times.photons, self.dispatch_seconds);
         Ok(times)
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::scene::SceneBuffers;
-use super::{N_STAGES, PHOTONS};
+use super::{N_STAGES, PHOTONS, Pace};
 use crate::device::Error;
 use crate::gpu::buffers::{Array, Readback};
 use crate::gpu::context::Context;
@@ -22,7 +22,7 @@ const N_TOTALS: u32 = 4;
 /// Threads a workgroup.
 const THREADS: u32 = 64;
 /// Workgroups of the smallest dispatches of paths.
-const FEWEST_GROUPS: u32 = 64;
+const FEWEST_GROUPS: u32 = 16;
 
 /// Kernels and memory of the photon paths.
 pub(super) struct PhotonPaths {
@@ -33,10 +33,8 @@ pub(super) struct PhotonPaths {
     slots: Array,
     counters: Array,
     states: Array,
-    /// Workgroups of the last [`PhotonPaths::trace`], all chunks together.
-    n_groups: u32,
-    /// Workgroups a dispatch of paths has at most.
-    most_groups: u32,
+    /// In workgroups.
+    pub(super) pace: Pace,
     /// Rounds each chunk gets. A thread that needs more shows in the counters; then all is done again with more.
     rounds: u32,
 }
@@ -52,8 +50,7 @@ impl PhotonPaths {
             slots: Array::new::<Photon>("photon slots"),
             counters: Array::new::<u32>("photon counters"),
             states: Array::new::<[u32; 16]>("photon paths"),
-            n_groups: 0,
-            most_groups: CHUNK / THREADS,
+            pace: Pace::new(THREADS * PATHS, CHUNK / THREADS),
             rounds: 2,
         })
     }
@@ -68,6 +65,7 @@ impl PhotonPaths {
         photons: &mut Array,
         readback: &mut Readback,
         timer: &mut Timer<N_STAGES>,
+        dispatch_seconds: f64,
     ) -> Result<u32, Error> {
         self.slots.reserve(context, u64::from(CHUNK * SLOTS))?;
         self.counters.reserve(context, u64::from(N_TOTALS + CHUNK + 2 * CHUNK / THREADS))?;
@@ -76,12 +74,11 @@ impl PhotonPaths {
             let most = context.most_bytes_bound() / size_of::<Photon>() as u64;
             photons.reserve(context, (2 * u64::from(frame.n_paths)).min(most))?;
         }
-        self.n_groups = frame.n_paths.div_ceil(THREADS * PATHS);
         let most_rounds = (PATHS * frame.max_photon_segments).div_ceil(SLOTS).max(1);
         loop {
             self.rounds = self.rounds.min(most_rounds);
             let room = photons.capacity().min(u64::from(u32::MAX)) as u32;
-            self.record(context, shared, scene, frame, photons, room, timer)?;
+            self.record(context, shared, scene, frame, photons, room, timer, dispatch_seconds)?;
             let totals: Vec<u32> = readback.read(context, shared, self.counters.raw(), N_TOTALS as usize)?;
             let [n, _, unfinished, _] = totals[..] else { unreachable!("four words were asked for") };
             if unfinished > 0 && self.rounds < most_rounds {
@@ -98,16 +95,8 @@ impl PhotonPaths {
         }
     }
 
-    /// Chooses the size of the dispatches of paths from the seconds the last ones took together, rounds and all.
-    pub(super) fn fit(&mut self, took: f64, dispatch_seconds: f64) {
-        if took > 0.0 {
-            let n = f64::from(self.n_groups) * dispatch_seconds / took;
-            self.most_groups = (n as u32).clamp(FEWEST_GROUPS, CHUNK / THREADS);
-        }
-    }
-
     fn record(
-        &self,
+        &mut self,
         context: &Context,
         shared: &Shared,
         scene: &SceneBuffers,
@@ -115,29 +104,37 @@ impl PhotonPaths {
         photons: &Array,
         room: u32,
         timer: &mut Timer<N_STAGES>,
+        dispatch_seconds: f64,
     ) -> Result<(), Error> {
         let mut batch = Batch::new(context, shared, "photons");
         scene.set_frame(&batch, frame);
         timer.begin(PHOTONS, &mut batch);
         batch.encoder().clear_buffer(self.counters.raw(), 0, Some(u64::from(4 * N_TOTALS)));
+        // Workgroups that begin paths, recorded since the last cut. Few paths are left for the rounds after the first: they
+        // say nothing about what a path takes.
+        let mut begun = 0;
         for first in (0..frame.n_paths).step_by((CHUNK * PATHS) as usize) {
             if first > 0 {
-                batch.cut()?;
+                self.pace.learn(batch.cut(std::mem::take(&mut begun))?, dispatch_seconds);
             }
             let n = (CHUNK * PATHS).min(frame.n_paths - first);
             let groups = n.div_ceil(THREADS * PATHS);
             batch.dispatch(&self.emit, &[self.states.all()], [n, first, 0, 0], n.div_ceil(THREADS));
             for round in 0..self.rounds {
                 if round > 0 {
-                    batch.cut_if_interruptible()?;
+                    let took = batch.cut_if_interruptible(std::mem::take(&mut begun))?;
+                    self.pace.learn(took, dispatch_seconds);
                 }
                 let buffers = [self.slots.all(), self.counters.all(), self.states.all()];
-                for group in (0..groups).step_by(self.most_groups as usize) {
+                let mut group = 0;
+                while group < groups {
                     if group > 0 {
-                        batch.cut()?;
+                        self.pace.learn(batch.cut(std::mem::take(&mut begun))?, dispatch_seconds);
                     }
-                    let part = self.most_groups.min(groups - group);
+                    let part = self.pace.amount().max(FEWEST_GROUPS).min(groups - group);
                     batch.dispatch(&self.trace, &buffers, [n, first, round, group], part);
+                    begun += if round == 0 { part } else { 0 };
+                    group += part;
                 }
                 let buffers = [self.slots.all(), self.counters.all(), self.states.all(), photons.all()];
                 let last = u32::from(round + 1 == self.rounds);
