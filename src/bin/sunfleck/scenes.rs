@@ -8,9 +8,10 @@ use std::time::SystemTime;
 
 use anyhow::{Context, Result, bail};
 use sunfleck::output::atomic;
+use sunfleck::ppm::Interrupt;
 use sunfleck::scene::Environment;
 use sunfleck::scene::export::{self, glb_bytes};
-use sunfleck::scene::load::{LoadError, Loaded, load, load_environment};
+use sunfleck::scene::load::{LoadError, Loaded, load_environment, load_unless};
 use sunfleck::scene::settings::Settings;
 use sunfleck::scene::shipped::{NAMES, shipped};
 
@@ -94,10 +95,15 @@ impl Source {
 
     /// Reads the scene as its file has it, or makes a shipped one; with what was not honoured.
     pub fn scene(&self) -> Result<Loaded> {
+        self.scene_unless(&Interrupt::default())
+    }
+
+    /// The same, unless `interrupt` ends it.
+    pub fn scene_unless(&self, interrupt: &Interrupt) -> Result<Loaded> {
         if let Some(scene) = is_shipped(&self.file).then(|| shipped(&self.file.to_string_lossy())).flatten() {
             return Ok(Loaded { scene, warnings: vec![] });
         }
-        Ok(load(&self.file)?)
+        Ok(load_unless(&self.file, interrupt)?)
     }
 
     /// Settings as `file` is to hold them: what lies in its folder or below is named from there, so that the folder can be

@@ -1,6 +1,7 @@
 //! The scene file and the files it names: only regular files, only in the scene file's folder.
 
 use super::{LoadError, MAX_FILE_BYTES};
+use crate::device::Interrupt;
 use percent_encoding::percent_decode_str;
 use std::fs::{self, File};
 use std::io::{ErrorKind, Read};
@@ -13,11 +14,12 @@ pub(super) struct Source {
     file: PathBuf,
     /// Canonical.
     folder: PathBuf,
+    interrupt: Interrupt,
 }
 
 impl Source {
     /// Reads the scene file.
-    pub(super) fn open(path: &Path) -> Result<(Self, Vec<u8>), LoadError> {
+    pub(super) fn open(path: &Path, interrupt: &Interrupt) -> Result<(Self, Vec<u8>), LoadError> {
         let unreadable = |problem| LoadError::Unreadable { file: path.into(), problem };
         let bytes = read_regular(path, MAX_FILE_BYTES).map_err(unreadable)?;
         let parent = match path.parent() {
@@ -25,7 +27,14 @@ impl Source {
             _ => Path::new("."),
         };
         let folder = parent.canonicalize().map_err(|e| unreadable(e.to_string()))?;
-        Ok((Self { file: path.into(), folder }, bytes))
+        let source = Self { file: path.into(), folder, interrupt: interrupt.clone() };
+        source.go_on()?;
+        Ok((source, bytes))
+    }
+
+    /// Error: nobody wants the scene any more.
+    pub(super) fn go_on(&self) -> Result<(), LoadError> {
+        self.interrupt.check().map_err(|_| LoadError::Interrupted)
     }
 
     /// Error: the file is not what it should be.

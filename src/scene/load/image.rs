@@ -57,7 +57,10 @@ impl<'a> ImageTable<'a> {
             })?;
         }
         // The bytes of an image are dropped as soon as it is decoded.
-        let decode = |entry: Entry| entry.decode().map_err(|problem| entry.error(source, problem));
+        let decode = |entry: Entry| {
+            source.go_on()?;
+            entry.decode().map_err(|problem| entry.error(source, problem))
+        };
         self.entries.into_par_iter().map(decode).collect()
     }
 }

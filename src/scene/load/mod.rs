@@ -15,6 +15,7 @@ mod obj;
 mod packing;
 
 use super::Scene;
+use crate::device::Interrupt;
 use crate::mesh;
 pub use environment::load_environment;
 use files::Source;
@@ -36,6 +37,8 @@ const MAX_IMAGE_SIDE: u32 = 16_384;
 const MAX_DECODE_BYTES: u64 = 512 << 20;
 /// Metres from the origin, at most: squares of areas stay finite in f32.
 const MAX_COORDINATE: f32 = 1e9;
+/// Of a scene's size, how far apart coordinates may be: at ten times as much, light leaks and shadows break up.
+const COARSE: f32 = 1e-5;
 /// Warnings kept; the rest is counted.
 const MAX_WARNINGS: usize = 100;
 
@@ -109,12 +112,21 @@ pub enum LoadError {
         /// In words, with the limit.
         problem: String,
     },
+    /// An [`Interrupt`] ended the reading.
+    #[error("interrupted")]
+    Interrupted,
 }
 
 /// Reads a `.gltf`, `.glb` or `.obj` file.
 ///
 /// Textures and buffers are looked for in the file's folder and below, never outside.
 pub fn load(path: &Path) -> Result<Loaded, LoadError> {
+    load_unless(path, &Interrupt::default())
+}
+
+/// The same, unless `interrupt` ends it: with [`LoadError::Interrupted`], soon, but for the reading of a single large file
+/// from the disk, and for what is done at once to a single large mesh or image.
+pub fn load_unless(path: &Path, interrupt: &Interrupt) -> Result<Loaded, LoadError> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     if !matches!(extension.as_str(), "gltf" | "glb" | "obj") {
         // Say "no such file" before "unknown extension".
@@ -125,23 +137,39 @@ pub fn load(path: &Path) -> Result<Loaded, LoadError> {
         };
         return Err(LoadError::Format { file: path.into(), problem });
     }
-    let (source, bytes) = Source::open(path)?;
+    let (source, bytes) = Source::open(path, interrupt)?;
     let mut warnings = Warnings::default();
     let scene = if extension == "obj" {
         obj::load(&source, &bytes, &mut warnings)?
     } else {
         gltf::load(&source, &bytes, &mut warnings)?
     };
+    if let Some(warning) = far_away(&scene) {
+        warnings.push(format!("{}: {warning}", path.display()));
+    }
     if scene.meshes.iter().all(|mesh| mesh.triangles.is_empty()) {
         warnings.push(format!("{}: there are no triangles", path.display()));
     }
     Ok(Loaded { scene, warnings: warnings.finish() })
 }
 
+/// What is to be said of a scene that is so far from the origin, for its size, that f32 has too few places for it.
+fn far_away(scene: &Scene) -> Option<String> {
+    let [low, high] = scene.bounds(&[])?;
+    let (size, farthest) = (low.distance(high), low.abs().max(high.abs()).max_element());
+    let step = farthest * f32::EPSILON;
+    (step > COARSE * size && size > 0.0).then(|| {
+        format!(
+            "lies up to {farthest:.0} m from the origin, where coordinates are {step:.1e} m apart: too coarse for a scene of \
+             {size:.3} m; move it to the origin"
+        )
+    })
+}
+
 /// Reads the triangles of a `.gltf` or `.glb` file for a check: in double precision, nodes applied, faces in the order of the
 /// nodes and their primitives. And what in the file was not honoured.
 pub fn load_gltf_mesh(path: &Path) -> Result<(mesh::io::Loaded, Vec<String>), LoadError> {
-    let (source, bytes) = Source::open(path)?;
+    let (source, bytes) = Source::open(path, &Interrupt::default())?;
     let mut warnings = Warnings::default();
     let mesh = gltf::load_geometry(&source, &bytes, &mut warnings)?;
     Ok((mesh::io::Loaded::of_triangles(mesh), warnings.finish()))

@@ -10,6 +10,9 @@ use crate::scene::{Material, Mesh, Scene};
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
 
+/// Read at once, whoever does not want them any more.
+const LINES: usize = 4096;
+
 /// Reads a scene; `bytes` is the content of the file.
 pub(super) fn load(source: &Source, bytes: &[u8], warnings: &mut Warnings) -> Result<Scene, LoadError> {
     // Names may be in any encoding; numbers are ASCII.
@@ -17,6 +20,9 @@ pub(super) fn load(source: &Source, bytes: &[u8], warnings: &mut Warnings) -> Re
     let mut parser = Parser::new(source, warnings);
     let mut joined = String::new();
     for (i, line) in text.lines().enumerate() {
+        if i % LINES == 0 {
+            source.go_on()?;
+        }
         let place = Place { line: i + 1 };
         // A backslash at the end joins lines.
         if let Some(part) = line.trim_end().strip_suffix('\\') {
@@ -266,6 +272,7 @@ impl<'a> Parser<'a> {
         let mut default = None;
         let mut budget = Budget::new();
         for ((object, material, has_uv, has_normal), group) in self.groups {
+            self.source.go_on()?;
             let name = &self.materials[material];
             let material = match index_of.get(name) {
                 Some(&index) => index,

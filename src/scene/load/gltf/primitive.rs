@@ -45,6 +45,7 @@ pub(super) fn load_all(
             None => &mesh.weights,
         };
         for (i, primitive) in mesh.primitives.iter().enumerate() {
+            source.go_on()?;
             let place = format!("meshes[{mesh_index}].primitives[{i}]");
             let name = name(document, mesh, &placements, i);
             let Some(mut local) = reader.primitive(primitive, weights, &place)? else { continue };
@@ -62,6 +63,7 @@ pub(super) fn load_all(
             };
             let mut placements = placements.iter().peekable();
             while let Some(placement) = placements.next() {
+                source.go_on()?;
                 // The last instance may have the original.
                 let mut world = if placements.peek().is_some() { local.clone() } else { std::mem::take(&mut local) };
                 geometry::transform(&mut world, &placement.world_from_mesh);
