@@ -20,6 +20,8 @@ pub const MID_GREY: f32 = 0.18;
 
 /// What a logarithmic scale spans whose low end is not positive.
 const LOG_SPAN: f32 = 1e4;
+/// What one spans at most that is chosen automatically: of what is smaller, rounding errors among it, nothing can be seen.
+const MOST_LOG_SPAN: f32 = 1e6;
 
 /// Which value gets which place on the map.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -58,15 +60,16 @@ fn proper(low: f32, high: f32, log: bool) -> [f32; 2] {
     }
 }
 
-/// The 1st and the 99th percentile of the finite values (of the positive ones among them if `log`); if there are none,
-/// [0, 1]. They may be equal.
+/// The 1st and the 99th percentile of the finite values (of the positive ones among them if `log`, and then no more than six
+/// decades apart); if there are none, [0, 1]. They may be equal.
 pub fn automatic_range(values: &[f32], log: bool) -> [f32; 2] {
     let mut kept: Vec<f32> = values.iter().copied().filter(|v| v.is_finite() && (!log || *v > 0.0)).collect();
     let Some(last) = kept.len().checked_sub(1) else {
         return [0.0, 1.0];
     };
     let mut at = |i: usize| *kept.select_nth_unstable_by(i, f32::total_cmp).1;
-    [at(last / 100), at(last - last / 100)]
+    let [low, high] = [at(last / 100), at(last - last / 100)];
+    [if log { low.max(high / MOST_LOG_SPAN) } else { low }, high]
 }
 
 /// `values` through the map into `bytes`, RGBA8, whose old content goes; the range used.

@@ -198,6 +198,23 @@ fn outlives(idle: Duration) {
     assert_eq!(output::exr::read(&opened.folder.path().join("saved.exr")).unwrap().size, [64, 48]);
 }
 
+/// A signal saves as well, but over nothing: what is there may be another view, saved on purpose.
+#[test]
+fn a_picture_outlives_a_signal() {
+    let Some(mut opened) = Opened::new("cpu") else { return };
+    let title = format!("cornell – {ITERATIONS} iterations – Sunfleck");
+    let Opened { display, viewer, folder, .. } = &mut opened;
+    fs::write(folder.path().join("saved.exr"), "kept").unwrap();
+    wait_for("iterations", viewer, || display.window().filter(|(_, now)| *now == title));
+    let sent = Command::new("kill").args(["-TERM", &viewer.0.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    let (status, log) = opened.ended();
+    assert_eq!((status.code(), log.trim()), (Some(130), "saved the picture as saved-rescued-1.exr"));
+    let folder = opened.folder.path();
+    assert_eq!(fs::read(folder.join("saved.exr")).unwrap(), b"kept");
+    assert_eq!(output::exr::read(&folder.join("saved-rescued-1.exr")).unwrap().size, [64, 48]);
+}
+
 /// Opens a scene, orbits, changes a setting, saves, quits; what was saved is what its command renders.
 #[test]
 fn a_picture_saved_in_the_window_is_what_its_command_renders() {

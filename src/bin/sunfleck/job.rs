@@ -92,9 +92,11 @@ impl Job {
         })
     }
 
-    /// Reads the scene and chooses the camera and the estimator's parameters.
+    /// Reads the scene and chooses the camera and the estimator's parameters, for which there is room.
     pub fn load(&self, args: &RenderArgs) -> Result<Input> {
-        prepare(&self.source, &self.source.settings, self.source.scene()?, &args.input)
+        let input = prepare(&self.source, &self.source.settings, self.source.scene()?, &args.input)?;
+        check_memory(&input.params, None)?;
+        Ok(input)
     }
 }
 
@@ -143,7 +145,6 @@ pub fn params(settings: &Settings, args: &InputArgs, camera: &Camera) -> Result<
         params.max_eye_segments = params.max_eye_segments.min(n);
         params.max_photon_segments = params.max_photon_segments.min(n);
     }
-    check_memory(&params)?;
     Ok(params)
 }
 
@@ -233,20 +234,20 @@ fn check_outputs(args: &RenderArgs) -> Result<()> {
     Ok(())
 }
 
-/// Refuses a picture or a number of photons that this machine has no room for.
-pub fn check_memory(params: &Params) -> Result<()> {
-    let [width, height] = params.film_size();
-    // A pixel: what the eye sees, radiance, film, radius, and two copies on the way to a file.
-    let pixel = size_of::<EyeVertex>() + 12 + 16 + 4 + 2 * 16;
-    // A path: some four photons of 48 bytes, sorted into a second array, with keys and tree.
-    let path = 4 * (2 * 48 + 16);
+/// Refuses a picture or a number of photons that this machine has no room for, beside what is there but for that of `held`,
+/// whose place they take.
+pub fn check_memory(params: &Params, held: Option<&Params>) -> Result<()> {
+    if held.is_some_and(|held| needed(params).iter().zip(needed(held)).all(|(needs, has)| *needs <= has)) {
+        return Ok(());
+    }
     let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
-    let needs = [
-        (u64::from(width) * u64::from(height) * pixel as u64, format!("a picture of {width}x{height} pixels")),
-        (u64::from(params.n_paths) * path, format!("{} photon paths an iteration", params.n_paths)),
+    let [width, height] = params.film_size();
+    let what = [
+        format!("a picture of {width}x{height} pixels"),
+        format!("{} photon paths an iteration", params.n_paths),
     ];
-    let available = available_memory();
-    for (bytes, what) in needs {
+    let available = available_memory().saturating_add(held.map_or(0, |held| needed(held).iter().sum()));
+    for (bytes, what) in needed(params).into_iter().zip(what) {
         ensure!(
             bytes <= available,
             "{what} would need some {:.1} GiB of memory; {:.1} GiB are free",
@@ -257,6 +258,16 @@ pub fn check_memory(params: &Params) -> Result<()> {
     Ok(())
 }
 
+/// Bytes for the picture, and for the photons of an iteration.
+fn needed(params: &Params) -> [u64; 2] {
+    let [width, height] = params.film_size();
+    // A pixel: what the eye sees, radiance, film, radius, and two copies on the way to a file.
+    let pixel = size_of::<EyeVertex>() + 12 + 16 + 4 + 2 * 16;
+    // A path: some four photons of 48 bytes, sorted into a second array, with keys and tree.
+    let path = 4 * (2 * 48 + 16);
+    [u64::from(width) * u64::from(height) * pixel as u64, u64::from(params.n_paths) * path]
+}
+
 /// Bytes, as far as the system tells; else a bound on what anybody has.
 fn available_memory() -> u64 {
     const UNKNOWN: u64 = 64 << 30;
@@ -265,9 +276,14 @@ fn available_memory() -> u64 {
     let free = read("/proc/meminfo")
         .and_then(|text| number(text.lines().find(|line| line.starts_with("MemAvailable:"))?))
         .map_or(UNKNOWN, |kib| kib.saturating_mul(1024));
-    let group = |file: &str| read(&format!("/sys/fs/cgroup/{file}")).and_then(|text| number(&text));
-    let allowed = group("memory.max").map_or(u64::MAX, |max| max.saturating_sub(group("memory.current").unwrap_or(0)));
-    free.min(allowed)
+    let group = |file: &str| read(&format!("/sys/fs/cgroup/{file}"));
+    let bytes = |file: &str| group(file).and_then(|text| number(&text));
+    // What files have left in memory is given back when it is asked for.
+    let files = group("memory.stat")
+        .and_then(|text| number(text.lines().find(|line| line.starts_with("inactive_file "))?))
+        .unwrap_or(0);
+    let used = bytes("memory.current").unwrap_or(0).saturating_sub(files);
+    free.min(bytes("memory.max").map_or(u64::MAX, |max| max.saturating_sub(used)))
 }
 
 #[cfg(test)]

@@ -251,7 +251,7 @@ fn measure(
     if !args.normal_mode {
         use_paper_mode(&mut params);
     }
-    check_memory(&params)?;
+    check_memory(&params, None)?;
     let input = Input { scene, camera, params, warnings: vec![] };
     let packed = PackedScene::new(&input.scene);
     let mut runners = Vec::new();

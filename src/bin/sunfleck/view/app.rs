@@ -311,7 +311,10 @@ impl Viewer {
             ToneMap::Agx => ToneMap::Srgb,
             ToneMap::Srgb => ToneMap::Neutral,
         };
-        self.show_otherwise(ui, "tone curve", |s| s.tonemap = Some(next));
+        // As it was in the beginning, nothing is said.
+        let read = self.editing.as_ref().and_then(|opened| opened.read.tonemap);
+        let said = if next == read.unwrap_or_default() { read } else { Some(next) };
+        self.show_otherwise(ui, "tone curve", |s| s.tonemap = said);
     }
 
     /// One iteration, then a pause.
@@ -341,7 +344,12 @@ impl Viewer {
     pub fn command(&self) -> Option<String> {
         let opened = self.editing.as_ref()?;
         let iterations = self.now.frame.as_ref().map_or(1, |frame| frame.film.n_iterations);
-        Some(opened.command(self.edits.now(), self.engine.device_flags(), iterations, Path::new("picture.exr")))
+        let flags = self.engine.device_flags();
+        // It may be pasted anywhere.
+        let scene = Path::new(&opened.source.name);
+        let absolute = scene.exists().then(|| crate::scenes::absolute(scene).ok()).flatten();
+        let scene = absolute.as_ref().unwrap_or(&opened.source.name);
+        Some(opened.command(scene, self.edits.now(), flags, iterations, Path::new("picture.exr")))
     }
 
     /// What is open.
@@ -476,14 +484,15 @@ impl Viewer {
         let time = ui.input(|i| i.time);
         self.engine.take_messages().into_iter().for_each(|message| self.messages.say(time, message));
         if !is_same(self.editing.as_ref(), self.now.opened.as_ref()) {
-            self.selected = None;
             let before = std::mem::replace(&mut self.editing, self.now.opened.clone());
+            let selected = self.selected.take().zip(before.clone());
             self.picture.forget();
             if let Some(opened) = self.editing.clone() {
                 self.remembered.opened(&opened.source.name);
                 let settings = &opened.source.settings;
                 match before.filter(|before| self.wanted.reads_again && before.choice == opened.choice) {
                     Some(before) => {
+                        self.selected = selected.and_then(|(i, before)| opened.material_as(&before, i));
                         self.edits.map(|edited| edited.rebased(&before.source.settings, settings));
                         self.wanted.settings = self.wanted.settings.take().map(|_| Arc::clone(self.edits.now()));
                     }

@@ -11,6 +11,8 @@ use crate::progress;
 
 /// Room that the limits need, points; with less they are in a menu.
 const LIMITS_WIDTH: f32 = 370.0;
+/// Of the button that pauses, points.
+const PAUSE_WIDTH: f32 = 64.0;
 const PROGRESS_WIDTH: f32 = 150.0;
 
 /// Menus and the controls of the run.
@@ -101,7 +103,9 @@ fn run(ui: &mut egui::Ui, viewer: &mut Viewer) {
         true => ("Resume", "Go on (P)"),
         false => ("Pause", "After the iteration under way; nothing is lost (P)"),
     };
-    if ui.add(Button::new(name).selected(paused)).on_hover_text(help).clicked() {
+    // As wide either way: what is beside it stays where it is.
+    let button = Button::new(name).selected(paused).min_size(egui::vec2(PAUSE_WIDTH, 0.0));
+    if ui.add(button).on_hover_text(help).clicked() {
         viewer.wanted.paused = !paused;
     }
     if ui.button("Step").on_hover_text("One iteration, then pause (N)").clicked() {

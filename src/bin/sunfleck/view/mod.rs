@@ -21,6 +21,7 @@ mod messages;
 mod offscreen;
 mod picture;
 mod settings;
+mod signals;
 mod start;
 mod state;
 #[cfg(test)]
@@ -44,6 +45,7 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode> {
     let bell = window::Bell::default();
     let engine = engine::Engine::start(device, bell.wake())?;
     let mut viewer = Viewer::new(engine, bell.wake(), first);
-    window::run(&mut viewer, &bell, window::options, &mut ())?;
-    Ok(ExitCode::SUCCESS)
+    let mut signals = signals::Signals::install(bell.wake())?;
+    window::run(&mut viewer, &bell, window::options, &mut signals)?;
+    Ok(signals.end(&viewer))
 }

@@ -3,6 +3,7 @@
 use std::panic::AssertUnwindSafe;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 use std::{panic, thread};
 
 use anyhow::{Result, anyhow};
@@ -16,6 +17,9 @@ use super::exit;
 const APP_ID: &str = "sunfleck";
 /// A device that fails before it has drawn so many is not opened again.
 pub const FEWEST_FRAMES: usize = 10;
+/// Nor is one when so many have failed within [`A_WHILE`].
+const MOST_FAULTS: usize = 4;
+const A_WHILE: Duration = Duration::from_secs(60);
 
 /// The window that there is, for threads that have news for it.
 #[derive(Clone, Default)]
@@ -84,9 +88,6 @@ pub struct Drawn<'a> {
     pub device: Option<&'a wgpu::Device>,
 }
 
-/// Nobody.
-impl Guest for () {}
-
 /// How the window is at first.
 pub fn options() -> eframe::NativeOptions {
     eframe::NativeOptions {
@@ -114,6 +115,7 @@ pub fn run(
         let why = anyhow!("the display is gone");
         crate::say_error(&crate::one_line(&crate::chain(&with_picture(why, rescue(&last, write)))));
     });
+    let mut faults = vec![];
     loop {
         let (fault, mut n_frames) = (Fault::default(), 0);
         let shown = (&mut *viewer, &mut *guest, &mut n_frames);
@@ -135,7 +137,7 @@ pub fn run(
         });
         let why = match (ended, fault.get()) {
             (Ok(Ok(())), None) => return Ok(()),
-            (Ok(Ok(())), Some(fault)) if n_frames >= FEWEST_FRAMES => {
+            (Ok(Ok(())), Some(fault)) if n_frames >= FEWEST_FRAMES && !is_often(&mut faults, Instant::now()) => {
                 let text = format!("the window's graphics device failed ({fault}); it was opened again");
                 eprintln!("sunfleck: warning: {text}");
                 viewer.tell(Message::Warning(text));
@@ -147,6 +149,13 @@ pub fn run(
         };
         return Err(with_picture(why, rescue(&viewer.last_save(), viewer.engine().writer())));
     }
+}
+
+/// Notes a fault of a moment; whether there are too many of late.
+fn is_often(faults: &mut Vec<Instant>, now: Instant) -> bool {
+    faults.retain(|then| now - *then < A_WHILE);
+    faults.push(now);
+    faults.len() >= MOST_FAULTS
 }
 
 /// What winit says, without the line of its source that it says first.
@@ -186,13 +195,23 @@ fn library(file: &str) -> Option<String> {
     rest.split('/').nth(1).map(str::to_owned)
 }
 
-/// Writes the newest film as the last frame would have, or wherever it can be written; where that is.
-fn rescue(last: &LastSave, write: impl Fn(&Save) -> Result<()>) -> Option<PathBuf> {
+/// Writes the newest picture as the last frame would have, or wherever it can be written, but over no file; where that is.
+pub fn rescue(last: &LastSave, write: impl Fn(&Save) -> Result<()>) -> Option<PathBuf> {
     let last = last.lock().unwrap_or_else(PoisonError::into_inner).clone()?;
     let name = format!("sunfleck-{}.exr", std::process::id());
     let places = [last.path.clone(), PathBuf::from(&name), std::env::temp_dir().join(&name)];
-    let wanted = places.into_iter().filter(|path| !path.as_os_str().is_empty());
+    let wanted = places.into_iter().filter(|path| !path.as_os_str().is_empty()).map(beside);
     wanted.map(|path| Save { path, ..last.clone() }).find(|save| write(save).is_ok()).map(|save| save.path)
+}
+
+/// Where a picture goes whose place may be taken: by one of another view perhaps, which was saved on purpose.
+fn beside(path: PathBuf) -> PathBuf {
+    if !path.exists() {
+        return path;
+    }
+    let [stem, extension] = [path.file_stem(), path.extension()].map(|part| part.unwrap_or_default().to_string_lossy());
+    let name = |i: u32| path.with_file_name(format!("{stem}-rescued-{i}.{extension}"));
+    (1..).map(name).find(|path| !path.exists()).unwrap_or(path)
 }
 
 fn with_picture(why: anyhow::Error, saved: Option<PathBuf>) -> anyhow::Error {

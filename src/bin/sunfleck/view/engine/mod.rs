@@ -21,7 +21,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
-use anyhow::{Context, Result};
+use anyhow::{Error, Result};
 use glam::Vec3;
 use sunfleck::output::Picture;
 use sunfleck::ppm::Interrupt;
@@ -127,9 +127,22 @@ pub struct Opened {
 }
 
 impl Opened {
-    /// What renders this scene with `settings` on the command line, on the device that the flags say.
-    pub fn command(&self, settings: &Settings, device_flags: &str, iterations: u32, output: &Path) -> String {
-        let mut command = format!("sunfleck render {}", crate::render::quote(&self.source.name));
+    /// The material called as the one of that index was in a version before.
+    pub fn material_as(&self, before: &Self, index: usize) -> Option<usize> {
+        let name = &before.loaded.scene.materials.get(index)?.name;
+        self.loaded.scene.materials.iter().position(|material| material.name == *name)
+    }
+
+    /// What renders this scene, called `scene`, with `settings` on the command line, on the device that the flags say.
+    pub fn command(
+        &self,
+        scene: &str,
+        settings: &Settings,
+        device_flags: &str,
+        iterations: u32,
+        output: &Path,
+    ) -> String {
+        let mut command = format!("sunfleck render {}", crate::render::quote(scene));
         for pair in settings.difference(&self.read) {
             command += &format!(" --set {}", crate::render::quote(&pair));
         }
@@ -345,8 +358,9 @@ impl Engine {
     pub fn writer(&self) -> impl Fn(&Save) -> Result<()> + Send + 'static {
         let shared = Arc::clone(&self.shared);
         move |save| {
-            let frame = shared.board().frame.clone();
-            save.write(frame.as_deref().context("there is no picture yet")?).map(|_| ())
+            let ready = save.ready(&shared.board()).unwrap_or(Err("there is no picture yet"));
+            let frame = ready.map_err(Error::msg)?;
+            save.write(&frame).map(|_| ())
         }
     }
 

@@ -25,7 +25,7 @@ pub struct Save {
 
 impl Save {
     /// What is to be written, or why nothing is; none as long as that is to be seen.
-    fn ready(&self, board: &Board) -> Option<Result<Arc<Frame>, &'static str>> {
+    pub(super) fn ready(&self, board: &Board) -> Option<Result<Arc<Frame>, &'static str>> {
         if self.scene != board.wanted.scene {
             return Some(Err("its scene was left before there was a picture of it"));
         }
@@ -47,9 +47,11 @@ impl Save {
         if job::is_png(&self.path) {
             output::png::write(&self.path, &picture, &self.look)?;
         } else {
+            let (opened, flags) = (&frame.opened, &machine.flags);
+            let name = &opened.source.name;
             let header = output::exr::Header {
-                scene: frame.opened.source.name.clone(),
-                command: frame.opened.command(&frame.settings, &machine.flags, film.n_iterations, &self.path),
+                scene: name.clone(),
+                command: opened.command(name, &frame.settings, flags, film.n_iterations, &self.path),
                 adapter: machine.device.clone(),
                 index: machine.index.clone(),
                 accelerator: frame.scene.accelerator().to_string(),

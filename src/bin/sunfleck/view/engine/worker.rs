@@ -127,7 +127,7 @@ impl Have {
             });
             let Some(choice) = wanted.scene.clone() else { return Ok(()) };
             let is_left = |board: &Board| is_other_scene(wanted, &board.wanted);
-            let Some(opened) = self.reader.read(shared, move || reading::open(&choice), is_left)? else {
+            let Some(opened) = self.reader.read(shared, move |interrupt| reading::open(&choice, interrupt), is_left)? else {
                 return Ok(());
             };
             let opened = Arc::new(opened);
@@ -168,11 +168,14 @@ impl Have {
         };
         match self.session.as_mut().filter(|session| is_same_scene(session)) {
             Some(session) => {
+                let held = session.input.params.clone();
                 job::prepare_again(&mut session.input, &settings, &opened.loaded.scene.cameras)?;
+                job::check_memory(&session.input.params, Some(&held))?;
                 session.settings = Arc::new(settings);
             }
             None => {
                 let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
+                job::check_memory(&input.params, self.session.as_ref().map(|session| &session.input.params))?;
                 shared.update(|board| board.phase = Phase::Preparing);
                 let before = self.session.take();
                 // What has been said of this scene is not said again at every change.
@@ -223,12 +226,16 @@ impl Have {
             Err(Error::Interrupted) => return Ok(()),
             done => done?,
         };
+        let (noise, wanted) = {
+            // A step that was asked for meanwhile is this one.
+            let board = shared.board();
+            (board.noise(), Wanted { paused: board.wanted.paused, steps: board.wanted.steps, ..wanted.clone() })
+        };
         if wanted.paused {
             self.steps_done = (self.steps_done + 1).min(wanted.steps);
         }
-        let noise = shared.board().noise();
         shared.note(|board| board.history.records.push(record));
-        self.show(shared, wanted, !self.can_go_on(wanted, noise))
+        self.show(shared, &wanted, !self.can_go_on(&wanted, noise))
     }
 
     /// Publishes the film now and then; at once if it `is_last` for a while.
