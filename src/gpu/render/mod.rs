@@ -461,7 +461,7 @@ impl Stages for GpuStages {
             self.timer.read(&self.context, &self.shared, &mut self.readback)?;
         let times = StageTimes { eye, photons, build, gather, accumulate };
         if self.n_photons > 0 && times.build > 0.0 {
-            self.photon_seconds = Some(times.build / f64::from(self.n_photons * Index::N_PARTS));
+            self.photon_seconds = Some(times.build / f64::from(self.n_photons) / f64::from(Index::N_PARTS));
         }
         Ok(times)
     }
