@@ -20,6 +20,11 @@ const MOST_MEANS: usize = 100;
 /// Width below which fewer plots stand side by side, points.
 const LEAST_WIDTH: f32 = 210.0;
 
+/// Decades that a logarithmic axis shows, at most.
+const MOST_DECADES: f64 = 100.0;
+/// Span of a linear axis, at most.
+const MOST_LINEAR: f64 = 1e9;
+
 /// Width that the errors need beside the choice of plots, points.
 const FIGURES_WIDTH: f32 = 260.0;
 
@@ -280,7 +285,15 @@ fn plot(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &Hidden, by_sec
     } else {
         plot = plot.include_y(0.0);
     }
+    let most = [MOST_DECADES, if kind.is_log() { MOST_DECADES } else { MOST_LINEAR }];
     plot.show(ui, |plot| {
+        let bounds = plot.plot_bounds();
+        if let Some(x) = narrowed(bounds.range_x(), most[0]) {
+            plot.set_plot_bounds_x(x);
+        }
+        if let Some(y) = narrowed(bounds.range_y(), most[1]) {
+            plot.set_plot_bounds_y(y);
+        }
         for Curve { name, points, place } in curves.iter().filter(|curve| !hidden.contains(&(kind, curve.place))) {
             let (id, series) = (egui::Id::unique((kind, *place)), PlotPoints::from(points.clone()));
             if points.len() == 1 {
@@ -388,14 +401,20 @@ fn slope(points: &[[f64; 2]], exponent: f64) -> Vec<[f64; 2]> {
     vec![[first[0], last[1] + exponent * (last[0] - first[0])], *last]
 }
 
+/// The middle of a range that spans more than `most`.
+fn narrowed(range: RangeInclusive<f64>, most: f64) -> Option<RangeInclusive<f64>> {
+    let middle = 0.5 * (range.start() + range.end());
+    (range.end() - range.start() > most).then_some(middle - 0.5 * most..=middle + 0.5 * most)
+}
+
 /// Decades, and what lies between them if there are few.
 fn log_marks(input: GridInput) -> Vec<GridMark> {
-    let (first, last) = (input.bounds.0.floor() as i32, input.bounds.1.ceil() as i32);
-    if last - first > 100 {
+    let (first, last) = (input.bounds.0.floor(), input.bounds.1.ceil());
+    if last - first > MOST_DECADES {
         return vec![];
     }
-    let between = if last - first > 8 { 1 } else { 9 };
-    (first..last)
+    let between = if last - first > 8.0 { 1 } else { 9 };
+    (first as i32..last as i32)
         .flat_map(|decade| (1..=between).map(move |digit| (decade, digit)))
         .map(|(decade, digit)| {
             let step_size = match digit {
@@ -508,6 +527,12 @@ mod tests {
     }
 
     #[test]
+    fn an_axis_that_spans_too_much_shows_its_middle() {
+        assert_eq!(narrowed(-40.0..=60.0, 100.0), None);
+        assert_eq!(narrowed(-1e12..=3e12, 100.0), Some(1e12 - 50.0..=1e12 + 50.0));
+    }
+
+    #[test]
     fn marks_of_a_logarithmic_axis() {
         let marks = log_marks(GridInput { bounds: (-0.2, 1.5), base_step_size: 0.01 });
         let labels = |range: RangeInclusive<f64>| {
@@ -518,7 +543,12 @@ mod tests {
         assert_eq!(near, ["1", "2", "5", "10", "20"]);
         // Of a range in which there may be no 1, 2 or 5, every digit; what lies outside of it is not drawn.
         assert_eq!(one.len(), marks.len());
-        assert!(log_marks(GridInput { bounds: (-1e9, 1e9), base_step_size: 1.0 }).is_empty());
+        for far in [1e3, 1e9, 1.5e9, 1e12, 1e300, f64::INFINITY] {
+            for bounds in [(-far, far), (0.0, far), (-far, 0.0), (far, far + 3.0)] {
+                let n = log_marks(GridInput { bounds, base_step_size: 1.0 }).len();
+                assert!(n <= 27, "{bounds:?}: {n}");
+            }
+        }
         assert_eq!([0.9, 1.0, 1e3, 2e4, 5e6].map(count), ["", "1", "1000", "20k", "5M"]);
         assert_eq!((Kind::Error.mark(-3.0), Kind::Radius.mark(-3.0)), ("1e-3".to_owned(), "1.00 mm".to_owned()));
     }

@@ -424,6 +424,22 @@ fn convergence_is_plotted() {
     assert_eq!(n_hidden(&mut window), 0);
 }
 
+/// However far the wheel is turned.
+#[test]
+fn plots_can_be_zoomed_out_for_ever() {
+    let mut window = Window::with_picture();
+    window.press(Modifiers::NONE, Key::F3);
+    window.steps(3);
+    let title = window.harness.get_by_label("Error, relMSE").rect();
+    window.harness.input_mut().events.push(Event::PointerMoved(title.left_bottom() + egui::vec2(100.0, 60.0)));
+    window.steps(2);
+    for _ in 0..60 {
+        window.harness.input_mut().events.push(Event::Zoom(0.5));
+        window.step();
+    }
+    assert!(window.shows("Error, relMSE"));
+}
+
 /// A screen reader finds every control.
 #[test]
 fn every_control_has_a_name() {
