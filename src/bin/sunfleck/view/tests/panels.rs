@@ -120,14 +120,14 @@ fn every_item_of_the_menus() {
 fn messages_stay_until_dismissed_or_read() {
     let mut window = bare();
     window.drop_file("picture.jpg".into());
-    assert!(window.shows("neither a scene"));
+    assert!(window.shows("not a scene"));
     window.press(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::C);
     assert!(window.shows("copied the command"));
     // Ten seconds.
     window.steps(600);
-    assert!(window.shows("neither a scene") && !window.shows("copied the command"));
+    assert!(window.shows("not a scene") && !window.shows("copied the command"));
     window.click("Dismiss");
-    assert!(!window.shows("neither a scene"));
+    assert!(!window.shows("not a scene"));
     window.drop_file("absent.glb".into());
     window.wait_for_message("absent.glb");
 }
