@@ -119,6 +119,7 @@ pub struct Viewer {
     pub keyboard: super::keys::Keyboard,
     pub dialog: Option<files::Dialog>,
     pub sky: Option<files::Sky>,
+    pub screenshots: files::Screenshots,
     /// To be read.
     reference: Option<PathBuf>,
     pub pick: files::Pick,
@@ -157,6 +158,7 @@ impl Viewer {
             dialog: None,
             sky: None,
             reference: first.reference,
+            screenshots: Default::default(),
             pick: Arc::new(files::pick),
             selected: None,
             had_popup: false,

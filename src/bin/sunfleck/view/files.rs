@@ -1,12 +1,15 @@
 //! Files: dialogs, dropped files, the clipboard.
 
 use std::borrow::Cow;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, mpsc};
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::thread::JoinHandle;
 
 use eframe::egui;
-
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder};
 use sunfleck::scene::settings::EnvironmentSettings;
 
 use super::app::Viewer;
@@ -306,7 +309,7 @@ pub fn dropped(ui: &egui::Ui, viewer: &mut Viewer, paths: &[PathBuf]) {
 /// The settings as the command line reads them.
 fn save_settings(ui: &egui::Ui, viewer: &mut Viewer, path: &Path) {
     let Some(text) = viewer.settings_text(path) else { return };
-    let written = sunfleck::output::atomic::write(path, |writer| std::io::Write::write_all(writer, text.as_bytes()));
+    let written = sunfleck::output::atomic::write(path, |writer| io::Write::write_all(writer, text.as_bytes()));
     let message = match written {
         Ok(()) => Message::Said(format!("saved {}", path.display())),
         Err(error) => Message::Error(error.to_string()),
@@ -323,17 +326,57 @@ pub fn copy_command(ui: &egui::Ui, viewer: &mut Viewer) {
 
 /// Writes a picture of the window into the working folder.
 pub fn screenshot(ui: &egui::Ui, viewer: &Viewer) {
-    let say = viewer.engine().speaker();
-    let write = move |image: std::sync::Arc<egui::ColorImage>| {
-        let path = free_name(Path::new(""), "sunfleck-window", "png");
-        let [width, height] = image.size.map(|n| n as u32);
-        let written = image::save_buffer(&path, image.as_raw(), width, height, image::ColorType::Rgba8);
-        say(match written {
-            Ok(()) => Message::Said(format!("saved {}", path.display())),
-            Err(error) => Message::Error(format!("{}: {error}", path.display())),
-        });
-    };
+    let write = viewer.screenshots.writer(PathBuf::new(), viewer.engine().speaker());
     ui.ctx().send_viewport_cmd(egui::ViewportCommand::Screenshot(egui::ScreenshotCallback::new(write)));
+}
+
+/// Pictures of the window on their way to files. Waits for them in the end.
+#[derive(Default)]
+pub struct Screenshots {
+    /// The thread that writes the newest one.
+    last: Arc<Mutex<Option<JoinHandle<()>>>>,
+}
+
+impl Screenshots {
+    /// Writes a picture into `folder`, on a thread of its own: the interface thread has it.
+    fn writer(
+        &self,
+        folder: PathBuf,
+        say: impl Fn(Message) + Send + 'static,
+    ) -> impl FnOnce(Arc<egui::ColorImage>) + Send + 'static {
+        let last = Arc::clone(&self.last);
+        move |image| {
+            let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+            let before = last.take();
+            *last = Some(std::thread::spawn(move || {
+                // Or both would take the same name.
+                if let Some(before) = before {
+                    let _ = before.join();
+                }
+                let path = free_name(&folder, "sunfleck-window", "png");
+                say(match write_png(&path, &image) {
+                    Ok(()) => Message::Said(format!("saved {}", path.display())),
+                    Err(error) => Message::Error(error.to_string()),
+                });
+            }));
+        }
+    }
+}
+
+impl Drop for Screenshots {
+    fn drop(&mut self) {
+        if let Some(last) = self.last.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            let _ = last.join();
+        }
+    }
+}
+
+fn write_png(path: &Path, image: &egui::ColorImage) -> Result<(), sunfleck::output::Error> {
+    let [width, height] = image.size.map(|n| n as u32);
+    sunfleck::output::atomic::write(path, |writer| {
+        let encoder = PngEncoder::new(writer);
+        encoder.write_image(image.as_raw(), width, height, ExtendedColorType::Rgba8).map_err(io::Error::other)
+    })
 }
 
 /// A file's name without its folder.
@@ -367,6 +410,35 @@ mod tests {
         for purpose in [Purpose::Open, Purpose::Reference] {
             assert!(without_dialog(purpose, "x").unwrap_err().contains("drop"));
         }
+    }
+
+    #[test]
+    fn pictures_of_the_window_are_written_beside_the_interface() {
+        let folder = tempfile::tempdir().unwrap();
+        let screenshots = Screenshots::default();
+        let image = Arc::new(egui::ColorImage::filled([5, 3], egui::Color32::from_rgb(10, 200, 30)));
+        let (go_on, waits) = mpsc::channel::<()>();
+        let (told, messages) = mpsc::channel();
+        let waits = Mutex::new(waits);
+        let first = screenshots.writer(folder.path().to_owned(), move |_| waits.lock().unwrap().recv().unwrap());
+        let second = screenshots.writer(folder.path().to_owned(), move |message| told.send(message).unwrap());
+        first(Arc::clone(&image));
+        second(image);
+        // The interface has them behind it, while the first is not even told of.
+        assert!(messages.try_recv().is_err());
+        go_on.send(()).unwrap();
+        drop(screenshots);
+        let path = folder.path().join("sunfleck-window-2.png");
+        assert_eq!(messages.recv().unwrap(), Message::Said(format!("saved {}", path.display())));
+        let written = image::open(path).unwrap().to_rgba8();
+        assert_eq!((written.dimensions(), written.get_pixel(4, 2).0), ((5, 3), [10, 200, 30, 255]));
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+        // What cannot be written is told, and leaves nothing behind.
+        let (told, messages) = mpsc::channel();
+        let nowhere = Screenshots::default();
+        let image = Arc::new(egui::ColorImage::filled([5, 3], egui::Color32::WHITE));
+        nowhere.writer(folder.path().join("absent"), move |message| told.send(message).unwrap())(image);
+        assert!(matches!(messages.recv().unwrap(), Message::Error(why) if why.contains("there is no folder")));
     }
 
     #[test]
