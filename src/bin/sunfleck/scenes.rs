@@ -22,6 +22,9 @@ use crate::cli::{ExportArgs, Usage};
 pub struct Source {
     /// As given.
     pub name: String,
+    /// The same file from the root, without links; none for a shipped scene.
+    #[cfg(feature = "view")]
+    pub canonical: Option<PathBuf>,
     /// A scene file, or the name of a shipped scene.
     pub file: PathBuf,
     /// What the settings file says; nothing without one.
@@ -52,15 +55,20 @@ impl Source {
     /// Reads the settings, if SCENE is a settings file; not yet the scene.
     pub fn resolve(scene: &str) -> Result<Self> {
         let path = Path::new(scene);
+        let named = Self {
+            name: scene.to_owned(),
+            #[cfg(feature = "view")]
+            canonical: path.canonicalize().ok(),
+            ..Self::default()
+        };
         if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
             check_name(scene)?;
-            let name = scene.to_owned();
-            return Ok(Self { name, file: path.to_owned(), ..Self::default() });
+            return Ok(Self { file: path.to_owned(), ..named });
         }
         let settings = Settings::load(path)?;
         settings.scene.as_ref().with_context(|| format!("{scene}: scene: is missing: it names a file"))?;
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        let mut source = Self { name: scene.to_owned(), settings, folder, ..Self::default() };
+        let mut source = Self { settings, folder, ..named };
         source.locate();
         Ok(source)
     }
@@ -331,6 +339,23 @@ mod tests {
         let shipped = Source::resolve("cornell").unwrap();
         let settings = shipped.rooted(&shipped.settings, Path::new("b.toml"));
         assert_eq!(settings.scene.as_deref(), Some("cornell"));
+    }
+
+    #[cfg(feature = "view")]
+    #[test]
+    fn a_file_is_the_same_by_whatever_path() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path().canonicalize().unwrap();
+        std::fs::create_dir(root.join("sub")).unwrap();
+        std::fs::write(root.join("a.toml"), "scene = \"cornell\"\n").unwrap();
+        std::fs::write(root.join("b.obj"), "").unwrap();
+        let canonical = |name: &str| Source::resolve(name).unwrap().canonical;
+        for name in ["a.toml", "b.obj"] {
+            for path in [root.join(name), root.join("sub/..").join(name)] {
+                assert_eq!(canonical(&path.to_string_lossy()), Some(root.join(name)));
+            }
+        }
+        assert_eq!(canonical("glass"), None);
     }
 
     #[test]

@@ -490,7 +490,9 @@ impl Viewer {
             let selected = self.selected.take().zip(before.clone());
             self.picture.forget();
             if let Some(opened) = self.editing.clone() {
-                self.remembered.opened(&opened.source.name);
+                if let Some(path) = &opened.source.canonical {
+                    self.remembered.opened(path);
+                }
                 let settings = &opened.source.settings;
                 match before.filter(|before| self.wanted.reads_again && before.choice == opened.choice) {
                     Some(before) => {

@@ -1,12 +1,14 @@
 //! What is shown while no scene is open: scenes that come with the program, files opened before, a place to drop one.
 
 use std::path::Path;
+use std::sync::mpsc;
 
 use eframe::egui;
 use egui::{Align2, Color32, FontId, Id, Rect, Response, Sense, Stroke, StrokeKind, TextureHandle, Ui, pos2, vec2};
 use sunfleck::scene::shipped::NAMES;
 
 use super::app::Viewer;
+use super::engine::Wake;
 use super::files;
 use crate::scenes::describe;
 
@@ -26,8 +28,40 @@ const LOOK_EVERY: f64 = 2.0;
 pub struct Page {
     /// Of the shipped scenes, in their order; made when they are first shown.
     thumbnails: Vec<Option<TextureHandle>>,
-    /// When the recent files were looked for, and which are there.
-    present: Option<(f64, Vec<String>)>,
+    absent: Absent,
+}
+
+/// Which of the recent files are not there any more: those alone that were looked for in vain.
+#[derive(Default)]
+struct Absent {
+    files: Vec<String>,
+    /// When they were last looked for.
+    when: Option<f64>,
+    /// A look under way, on a thread of its own: a disk that is not reached may never answer.
+    look: Option<mpsc::Receiver<Vec<String>>>,
+}
+
+impl Absent {
+    /// Looks for `files` now and then; `time` in seconds. Calls `wake` when it has looked.
+    fn update(&mut self, files: &[String], time: f64, wake: Wake) {
+        if let Some(look) = &self.look {
+            match look.try_recv() {
+                Ok(absent) => (self.files, self.when, self.look) = (absent, Some(time), None),
+                Err(mpsc::TryRecvError::Empty) => return,
+                Err(mpsc::TryRecvError::Disconnected) => self.look = None,
+            }
+        }
+        if self.when.is_some_and(|when| time - when <= LOOK_EVERY) {
+            return;
+        }
+        let (sender, look) = mpsc::channel();
+        let files = files.to_vec();
+        std::thread::spawn(move || {
+            let _ = sender.send(files.into_iter().filter(|path| !Path::new(path).is_file()).collect());
+            wake();
+        });
+        (self.when, self.look) = (Some(time), Some(look));
+    }
 }
 
 fn thumbnail(name: &str) -> Option<&'static [u8]> {
@@ -187,19 +221,14 @@ fn recent(ui: &mut Ui, viewer: &mut Viewer) {
     if viewer.remembered.recent.is_empty() {
         return;
     }
-    let time = ui.input(|i| i.time);
-    let page = &mut viewer.start;
-    if page.present.as_ref().is_none_or(|(when, _)| time - when > LOOK_EVERY) {
-        let there = viewer.remembered.recent.iter().filter(|path| Path::new(path).is_file()).cloned().collect();
-        page.present = Some((time, there));
-    }
-    let present = page.present.as_ref().map(|(_, there)| there.clone()).unwrap_or_default();
+    let wake = viewer.wake();
+    viewer.start.absent.update(&viewer.remembered.recent, ui.input(|i| i.time), wake);
     ui.add_space(4.0);
     ui.label(egui::RichText::new("Opened before").size(16.0).strong());
     ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
     let (mut open, mut remove) = (None, None);
     for path in &viewer.remembered.recent {
-        let is_there = present.contains(path);
+        let is_there = !viewer.start.absent.files.contains(path);
         let file = Path::new(path);
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let folder = file.parent().map(|folder| folder.to_string_lossy()).unwrap_or_default();
@@ -240,6 +269,37 @@ mod tests {
             assert_eq!(decode(name).map(|image| image.size), Some([320, 180]), "{name}");
             assert!(thumbnail(name).is_some_and(|bytes| bytes.len() < 50_000), "{name}");
         }
+    }
+
+    /// A look that does not come to its end holds nothing up.
+    #[test]
+    fn files_are_there_until_it_is_known_that_they_are_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let [there, gone] = ["there.obj", "gone.obj"].map(|name| folder.path().join(name));
+        std::fs::write(&there, "").unwrap();
+        let files = [there, gone.clone()].map(|path| path.to_string_lossy().into_owned());
+        let (woken, wakes) = mpsc::channel();
+        let wake: Wake = std::sync::Arc::new(move || woken.send(()).unwrap());
+        let mut absent = Absent::default();
+        let (never, look) = mpsc::channel();
+        absent.look = Some(look);
+        for time in 0..100 {
+            absent.update(&files, f64::from(time), wake.clone());
+        }
+        assert!(absent.files.is_empty() && wakes.try_recv().is_err());
+        drop(never);
+        absent.update(&files, 100.0, wake.clone());
+        assert!(absent.files.is_empty());
+        wakes.recv().unwrap();
+        absent.update(&files, 100.1, wake.clone());
+        assert_eq!(absent.files, files[1..]);
+        std::fs::write(gone, "").unwrap();
+        absent.update(&files, 102.0, wake.clone());
+        assert!(absent.look.is_none());
+        absent.update(&files, 102.2, wake.clone());
+        wakes.recv().unwrap();
+        absent.update(&files, 102.3, wake);
+        assert!(absent.files.is_empty());
     }
 
     #[test]

@@ -112,9 +112,8 @@ impl Default for Remembered {
 }
 
 impl Remembered {
-    /// Puts a file first; names of shipped scenes are not remembered.
-    pub fn opened(&mut self, name: &str) {
-        let Ok(path) = Path::new(name).canonicalize() else { return };
+    /// Puts a file first, which is named in full.
+    pub fn opened(&mut self, path: &Path) {
         let path = path.to_string_lossy().into_owned();
         self.recent.retain(|other| *other != path);
         self.recent.insert(0, path);
@@ -176,17 +175,11 @@ mod tests {
 
     #[test]
     fn recent_files_are_the_newest_first_and_once() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = |name: &str| {
-            let path = folder.path().join(name);
-            std::fs::write(&path, "").unwrap();
-            path.to_string_lossy().into_owned()
-        };
         let mut remembered = Remembered::default();
-        for name in [file("a.obj"), file("b.obj"), file("a.obj"), "no such file".to_owned(), "glass".to_owned()] {
-            remembered.opened(&name);
+        // None of them is there: the disk is not asked.
+        for name in ["/no/a.obj", "/no/b.obj", "/no/a.obj"] {
+            remembered.opened(Path::new(name));
         }
-        let names: Vec<_> = remembered.recent.iter().map(|p| Path::new(p).file_name().unwrap().to_owned()).collect();
-        assert_eq!(names, ["a.obj", "b.obj"]);
+        assert_eq!(remembered.recent, ["/no/a.obj", "/no/b.obj"]);
     }
 }
