@@ -210,11 +210,11 @@ pub struct ViewArgs {
     #[arg(long, value_name = "FILE")]
     pub reference: Option<PathBuf>,
 
-    /// Pause after so many iterations
+    /// Pause after so many iterations [default: as the settings file says, else never]
     #[arg(long, visible_alias = "spp", value_name = "N", allow_hyphen_values = true, value_parser = parse_count)]
     pub iterations: Option<u32>,
 
-    /// Pause after so many seconds of iterations
+    /// Pause after so many seconds of iterations [default: as the settings file says, else never]
     #[arg(long, value_name = "S", allow_hyphen_values = true, value_parser = positive_f64)]
     pub seconds: Option<f64>,
 

@@ -18,7 +18,7 @@ use super::engine::{
 use super::files;
 use super::messages::Messages;
 use super::picture::PictureView;
-use super::state::{Edits, Remembered};
+use super::state::{Edits, LimitsOfScenes, Remembered};
 use crate::cli::{Usage, ViewArgs};
 use crate::scenes::Source;
 
@@ -110,6 +110,7 @@ pub struct Viewer {
     pub previous: Option<Arc<Choice>>,
     /// Of [`First`].
     always: Vec<String>,
+    limits: LimitsOfScenes,
     /// Of a texture, pixels.
     most_side: usize,
     /// Of the window.
@@ -150,6 +151,7 @@ impl Viewer {
             timing: Default::default(),
             previous: None,
             always: first.always,
+            limits: LimitsOfScenes::new(first.limits),
             most_side: 0,
             title: String::new(),
             messages: Messages::default(),
@@ -499,10 +501,15 @@ impl Viewer {
                         self.selected = selected.and_then(|(i, before)| opened.material_as(&before, i));
                         self.edits.map(|edited| edited.rebased(&before.source.settings, settings));
                         self.wanted.settings = self.wanted.settings.take().map(|_| Arc::clone(self.edits.now()));
+                        let limits = |settings: &Settings| (settings.iterations, settings.seconds);
+                        if limits(&before.source.settings) != limits(settings) {
+                            self.wanted.limits = self.limits.of_next(self.wanted.limits, settings);
+                        }
                     }
                     None => {
                         self.edits = Edits::new(settings.clone());
                         self.wanted.settings = None;
+                        self.wanted.limits = self.limits.of_next(self.wanted.limits, settings);
                         self.picture = PictureView::default();
                     }
                 }

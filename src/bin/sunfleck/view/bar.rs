@@ -140,17 +140,20 @@ fn limits(ui: &mut egui::Ui, limits: &mut Limits) {
         noise: limits.noise.unwrap_or(off.noise),
     };
     let is_on = [limits.iterations.is_some(), limits.seconds.is_some(), limits.noise.is_some()];
-    // Nothing half typed stops the run, and all digits are shown: what is shown is read when a field is left.
+    // Nothing half typed stops the run, and all digits are shown: what is shown is read when a field is left. What a file or
+    // a flag says may lie outside the ranges.
     let whole = |text: &str| parse_count(text.trim()).ok().map(f64::from);
     let n = DragValue::new(&mut numbers.iterations).range(1..=u32::MAX).speed(1.0).suffix(" iterations");
     let n = n.update_while_editing(false).custom_parser(whole);
     let iterations = limit(ui, is_on[0], "iterations", "Stop after so many iterations since the restart", n);
     let s = DragValue::new(&mut numbers.seconds).range(0.1..=1e7).speed(0.5).suffix(" s");
-    let s = s.update_while_editing(false).custom_formatter(|seconds, _| seconds.to_string());
+    let s =
+        s.clamp_existing_to_range(false).update_while_editing(false).custom_formatter(|seconds, _| seconds.to_string());
     let seconds = limit(ui, is_on[1], "seconds", "Stop after so many seconds since the restart, pauses left out", s);
     let speed = 0.01 * numbers.noise;
     let e = DragValue::new(&mut numbers.noise).range(1e-9..=1.0).speed(speed).prefix("noise ");
-    let e = e.update_while_editing(false).custom_formatter(|noise, _| format!("{noise:e}"));
+    let e =
+        e.clamp_existing_to_range(false).update_while_editing(false).custom_formatter(|noise, _| format!("{noise:e}"));
     let help = "Stop when the estimated relMSE is as low as this. In it a single bright pixel (a firefly) counts little, \
                 and the blur of the radius nothing.";
     let noise = limit(ui, is_on[2], "noise", help, e);

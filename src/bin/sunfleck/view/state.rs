@@ -1,10 +1,12 @@
-//! What the window keeps: settings with undo, and what is remembered from one run to the next.
+//! What the window keeps: settings with undo, limits, and what is remembered from one run to the next.
 
 use std::path::Path;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use sunfleck::scene::settings::Settings;
+
+use super::engine::Limits;
 
 /// Files that are remembered.
 const MOST_RECENT: usize = 12;
@@ -91,6 +93,37 @@ impl Edits {
             self.undo.push(std::mem::replace(&mut self.now, after));
             self.last = None;
         }
+    }
+}
+
+/// Whose word the limits are: a flag's for every scene, a settings file's for its own.
+#[derive(Default)]
+pub struct LimitsOfScenes {
+    flags: Limits,
+    /// What the settings of the scene that is open have brought.
+    brought: Limits,
+    /// What was there before.
+    before: Limits,
+}
+
+impl LimitsOfScenes {
+    pub fn new(flags: Limits) -> Self {
+        Self { flags, ..Self::default() }
+    }
+
+    /// The limits that a scene with these settings begins with; `now` are those of the scene before.
+    pub fn of_next(&mut self, now: Limits, settings: &Settings) -> Limits {
+        let flags = self.flags;
+        let iterations = settings.iterations.map(|n| n.0).filter(|_| flags.iterations.is_none());
+        let seconds = settings.seconds.filter(|_| flags.seconds.is_none());
+        let without = Limits {
+            iterations: if self.brought.iterations.is_some() { self.before.iterations } else { now.iterations },
+            seconds: if self.brought.seconds.is_some() { self.before.seconds } else { now.seconds },
+            ..now
+        };
+        self.brought = Limits { iterations, seconds, noise: None };
+        self.before = without;
+        Limits { iterations: iterations.or(without.iterations), seconds: seconds.or(without.seconds), ..without }
     }
 }
 

@@ -1,13 +1,15 @@
 //! What people do without thinking: Escape, keys let go in any order, reading a file again, going back.
 
+use std::path::Path;
+
 use eframe::egui;
 use egui::{Event, Key, Modifiers, Role, ViewportCommand};
 use egui_kittest::kittest::Queryable;
 use sunfleck::output::difference::Measure;
 use sunfleck::scene::settings::Count;
 
-use super::Window;
-use crate::view::engine::{Comparison, Phase, View};
+use super::{NoPixels, Window};
+use crate::view::engine::{Comparison, Limits, Phase, View, is_same};
 use crate::view::files::Answer;
 
 /// A press or a release of a key that has another name with Shift.
@@ -221,6 +223,49 @@ fn what_is_changed_by_hand_outlives_a_file_that_is_read_again() {
     // Opening it anew begins anew.
     window.viewer().open(file.to_string_lossy());
     window.wait("the file alone", |viewer| viewer.edits.now().seed.is_none() && viewer.now.phase == Phase::Reached);
+}
+
+/// A flag's word is for every scene, a file's for its own.
+#[test]
+fn a_file_says_when_its_scene_stops() {
+    let flags = Limits { seconds: Some(600.0), ..Limits::default() };
+    let mut window = Window::with_limits(None, flags, NoPixels);
+    let [own, bare] = ["own.toml", "bare.toml"].map(|name| window.path(name));
+    let of_file = |n: u32| format!("{OWN}iterations = {n}\nseconds = 0.05\n");
+    std::fs::write(&own, of_file(2)).unwrap();
+    std::fs::write(&bare, OWN).unwrap();
+    let open = |window: &mut Window, file: &Path, set: &[&str]| {
+        let before = window.viewer().opened().cloned();
+        window.viewer().open_with(file.to_string_lossy(), set.iter().map(|&pair| pair.to_owned()).collect());
+        window.wait("scene", |viewer| viewer.opened().is_some() && !is_same(viewer.opened(), before.as_ref()));
+        window.viewer().wanted.limits
+    };
+    let first = open(&mut window, &own, &[]);
+    assert_eq!(first, Limits { iterations: Some(2), ..flags });
+    window.wait("limit", |viewer| viewer.now.phase == Phase::Reached);
+    let text = window.viewer().settings_text("a.toml".as_ref()).unwrap();
+    assert!(text.contains("iterations = 2\n") && text.contains("seconds = 0.05\n"), "{text}");
+    assert_eq!(open(&mut window, &bare, &[]), flags);
+    // What is chosen by hand waits while a file has the word.
+    window.viewer().wanted.limits.iterations = Some(7);
+    assert_eq!(open(&mut window, &own, &["iterations=9"]).iterations, Some(9));
+    window.viewer().wanted.limits.noise = Some(1e-6);
+    assert_eq!(open(&mut window, &bare, &[]), Limits { iterations: Some(7), noise: Some(1e-6), ..flags });
+    // Read again, the file has it if it says something else.
+    open(&mut window, &own, &[]);
+    window.viewer().wanted.limits.iterations = Some(5);
+    for (says, expected) in [(2, 5), (4, 4)] {
+        std::fs::write(&own, of_file(says)).unwrap();
+        let before = window.viewer().opened().cloned();
+        window.press(Modifiers::COMMAND, Key::R);
+        window.wait("file", |viewer| !is_same(viewer.opened(), before.as_ref()));
+        assert_eq!(window.viewer().wanted.limits.iterations, Some(expected));
+    }
+    // Less than the field goes down to.
+    let mut window = Window::with_limits(None, Limits::default(), NoPixels);
+    open(&mut window, &own, &[]);
+    window.steps(3);
+    assert_eq!(window.viewer().wanted.limits.seconds, Some(0.05));
 }
 
 #[test]

@@ -64,13 +64,15 @@ impl Window {
     }
 
     fn with_renderer(scene: Option<&str>, renderer: impl TestRenderer + 'static) -> Self {
+        Self::with_limits(scene, Limits { iterations: Some(ITERATIONS), ..Limits::default() }, renderer)
+    }
+
+    /// Limits as flags give them.
+    fn with_limits(scene: Option<&str>, limits: Limits, renderer: impl TestRenderer + 'static) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let set = ["size=32x24", "photons=500"].map(str::to_owned).to_vec();
-        let first = First {
-            choice: scene.map(|name| Choice { name: name.to_owned(), set }),
-            limits: Limits { iterations: Some(ITERATIONS), ..Limits::default() },
-            ..First::default()
-        };
+        let first =
+            First { choice: scene.map(|name| Choice { name: name.to_owned(), set }), limits, ..First::default() };
         let mut viewer = Viewer::new(engine(), Arc::new(|| {}), first);
         let asked = Arc::new(Mutex::new(vec![]));
         let (noted, place) = (Arc::clone(&asked), folder.path().to_owned());
