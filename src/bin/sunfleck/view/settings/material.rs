@@ -54,11 +54,15 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
         let text = viewer.selected.map_or_else(|| "none".to_owned(), title);
         let combo = egui::ComboBox::from_id_salt("material").width(ui.available_width()).selected_text(text).truncate();
         let inside = combo.show_ui(ui, |ui| {
-            for i in 0..scene.materials.len() {
-                if ui.selectable_label(viewer.selected == Some(i), title(i)).clicked() {
-                    picked = Some(i);
+            // Those in sight alone: a scene may have thousands.
+            let area = egui::ScrollArea::vertical().max_height(ui.spacing().combo_height).auto_shrink([false, true]);
+            area.show_rows(ui, ui.spacing().interact_size.y, scene.materials.len(), |ui, range| {
+                for i in range {
+                    if ui.selectable_label(viewer.selected == Some(i), title(i)).clicked() {
+                        picked = Some(i);
+                    }
                 }
-            }
+            });
         });
         inside.response
     });

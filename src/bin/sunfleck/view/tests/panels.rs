@@ -424,6 +424,46 @@ fn convergence_is_plotted() {
     assert_eq!(n_hidden(&mut window), 0);
 }
 
+/// A scene may have thousands of materials.
+#[test]
+fn the_list_of_materials_makes_what_is_in_sight() {
+    let mut window = Window::new(None);
+    let n = 300;
+    let paints = || (0..n).map(|i| format!("paint{i:03}"));
+    let faces = paints().map(|name| format!("usemtl {name}\nf 1 2 3\n")).collect::<String>();
+    let file = window.path("many.obj");
+    std::fs::write(&file, format!("mtllib many.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{faces}")).unwrap();
+    let materials = paints().map(|name| format!("newmtl {name}\nKd 0.5 0.5 0.5\n")).collect::<String>();
+    std::fs::write(window.path("many.mtl"), materials).unwrap();
+    let set = ["size=16x12", "photons=100"].map(str::to_owned).to_vec();
+    window.viewer().open_with(file.to_string_lossy(), set);
+    window.wait("scene", |viewer| viewer.opened().is_some_and(|opened| opened.loaded.scene.materials.len() >= n));
+    window.steps(3);
+    window.harness.get_by_role_and_label(Role::ComboBox, "Material").click_accesskit();
+    window.steps(5);
+    let listed = window.harness.query_all_by_label_contains("paint").count();
+    assert!((5..40).contains(&listed), "{listed}");
+    let first = window.harness.get_by_label("paint003").rect();
+    let delta = egui::vec2(0.0, -1e6);
+    for event in [
+        Event::PointerMoved(first.center()),
+        Event::MouseWheel {
+            unit: egui::MouseWheelUnit::Point,
+            delta,
+            source: egui::MouseWheelSource::Unknown,
+            phase: egui::TouchPhase::Move,
+            modifiers: Modifiers::NONE,
+        },
+    ] {
+        window.harness.input_mut().events.push(event);
+        window.step();
+    }
+    window.steps(30);
+    window.click("paint299");
+    let chosen = window.viewer().selected.unwrap();
+    assert_eq!(window.viewer().opened().unwrap().loaded.scene.materials[chosen].name, "paint299");
+}
+
 /// However far the wheel is turned.
 #[test]
 fn plots_can_be_zoomed_out_for_ever() {
