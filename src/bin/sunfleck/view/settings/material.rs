@@ -7,7 +7,7 @@ use sunfleck::scene::settings::{MaterialSettings, Settings};
 use sunfleck::scene::{Material, Scene};
 
 use super::color::color;
-use super::number::{Number, log_slider, slider};
+use super::number::{Number, Scale};
 use super::scene::tidy;
 use super::widgets::{Name, row};
 use crate::view::app::Viewer;
@@ -79,14 +79,18 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     }
 }
 
-/// A number of a material: where settings have it, what its file says, its range, why it would change nothing.
+/// A number of a material: where settings have it, what its file says, what it may be, why it would change nothing.
 struct Property {
     name: Name,
     field: fn(&mut MaterialSettings) -> &mut Option<f32>,
     own: f32,
-    range: [f64; 2],
+    scale: Scale,
     idle: Option<&'static str>,
 }
+
+/// Of the index of refraction.
+const BENDING: Scale =
+    Scale { number: Number::Plain, range: [1.0, 2.5], is_logarithmic: false, allowed: [0.01, f32::MAX] };
 
 /// Where settings have a colour of a material.
 type ColorField = fn(&mut MaterialSettings) -> &mut Option<[f32; 3]>;
@@ -131,25 +135,17 @@ fn properties(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, 
         }
     };
     let number_row = |ui: &mut Ui, viewer: &mut Viewer, property: Property| {
-        let Property { name, field, own, range: [low, high], idle } = property;
-        let is_factor = name.name == EMISSION_FACTOR.name;
+        let Property { name, field, own, scale, idle } = property;
         let (value, old) = (*field(&mut before.clone()), *field(&mut was.clone()));
-        let mut shown = f64::from(value.unwrap_or(own));
+        let mut shown = value.unwrap_or(own);
         let mut changed = false;
         let reset = row(ui, name, value != old, |ui| {
-            let slide = if is_factor { log_slider } else { slider };
-            let control = |ui: &mut Ui| slide(ui, &mut shown, Number::Plain, low..=high);
-            let response = ui.add_enabled_ui(idle.is_none(), control).inner;
+            let response = ui.add_enabled_ui(idle.is_none(), |ui| scale.show(ui, &mut shown)).inner;
             changed = response.changed();
             response.on_disabled_hover_text(idle.unwrap_or_default())
         });
         if changed {
-            let value = match name.name {
-                "Refraction" => (shown as f32).max(0.01),
-                _ if is_factor => (shown as f32).max(0.0),
-                _ => (shown as f32).clamp(0.0, 1.0),
-            };
-            viewer.edit(ui, name.name, |s| *field(s.material_mut(scene, index)) = Some(value));
+            viewer.edit(ui, name.name, |s| *field(s.material_mut(scene, index)) = Some(shown));
         }
         if reset {
             viewer.reset(ui, |s| {
@@ -159,14 +155,14 @@ fn properties(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, 
         }
     };
     color_row(ui, viewer, BASE_COLOR, |m| &mut m.base_color, own.base_color, 1.0);
-    let unit = |name, field, own| Property { name, field, own, range: [0.0, 1.0], idle: None };
+    let unit = |name, field, own| Property { name, field, own, scale: Scale::UNIT, idle: None };
     let [rough, through, shiny, bent] = idle(own, &before);
     for property in [
         Property { idle: rough, ..unit(ROUGHNESS, |m| &mut m.roughness, own.roughness) },
         unit(METALLIC, |m| &mut m.metallic, own.metallic),
         Property { idle: through, ..unit(TRANSMISSION, |m| &mut m.transmission, own.transmission) },
         Property { idle: shiny, ..unit(SPECULAR, |m| &mut m.specular, own.specular) },
-        Property { range: [1.0, 2.5], idle: bent, ..unit(IOR, |m| &mut m.ior, own.ior) },
+        Property { scale: BENDING, idle: bent, ..unit(IOR, |m| &mut m.ior, own.ior) },
     ] {
         number_row(ui, viewer, property);
     }
@@ -174,7 +170,7 @@ fn properties(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, 
     let shines = before.emission.map_or(own.emission, Vec3::from) != Vec3::ZERO;
     if shines || before.emission_strength != was.emission_strength {
         let factor = unit(EMISSION_FACTOR, |m| &mut m.emission_strength, 1.0);
-        number_row(ui, viewer, Property { range: [0.0, 1000.0], ..factor });
+        number_row(ui, viewer, Property { scale: Scale::factor(1000.0), ..factor });
     }
 }
 

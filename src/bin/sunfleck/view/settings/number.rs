@@ -122,6 +122,38 @@ pub fn log_slider(ui: &mut Ui, value: &mut f64, number: Number, range: RangeIncl
     any_slider(ui, value, number, range, true)
 }
 
+/// How a number is set with a slider, and what it may be.
+#[derive(Clone, Copy, Debug)]
+pub struct Scale {
+    pub number: Number,
+    /// Of the slider.
+    pub range: [f64; 2],
+    pub is_logarithmic: bool,
+    /// What is typed may lie outside the range, but not outside this.
+    pub allowed: [f32; 2],
+}
+
+impl Scale {
+    /// From 0 to 1.
+    pub const UNIT: Self =
+        Self { number: Number::Plain, range: [0.0, 1.0], is_logarithmic: false, allowed: [0.0, 1.0] };
+
+    /// A factor of any size, on a slider up to `most`.
+    pub const fn factor(most: f64) -> Self {
+        Self { number: Number::Plain, range: [0.0, most], is_logarithmic: true, allowed: [0.0, f32::MAX] }
+    }
+
+    /// The slider. A value that is changed by it is one that is allowed.
+    pub fn show(&self, ui: &mut Ui, value: &mut f32) -> Response {
+        let ([low, high], mut shown) = (self.range, f64::from(*value));
+        let response = any_slider(ui, &mut shown, self.number, low..=high, self.is_logarithmic);
+        if response.changed() {
+            *value = (shown as f32).clamp(self.allowed[0], self.allowed[1]);
+        }
+        response
+    }
+}
+
 fn any_slider(
     ui: &mut Ui,
     value: &mut f64,
@@ -217,6 +249,8 @@ pub fn rounded(n: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use egui_kittest::Harness;
+    use egui_kittest::kittest::Queryable;
 
     #[test]
     fn counts_are_short() {
@@ -295,6 +329,37 @@ mod tests {
         // Not the digits that are shown, but all that are not.
         for (number, x) in [(Plain, 2.0 / 3.0), (Count, 54_321.0), (Metres, 0.591_425_36), (Degrees, 1.0 / 7.0)] {
             assert_eq!(number.reader(x)(&number.text(x)), Some(x));
+        }
+    }
+
+    /// Whatever is typed, a setting gets what it may be.
+    #[test]
+    fn a_scale_keeps_what_is_allowed() {
+        let ior = Scale { number: Number::Plain, range: [1.0, 2.5], is_logarithmic: false, allowed: [0.01, f32::MAX] };
+        for (scale, from, text, to) in [
+            (Scale::UNIT, 0.5, "3", 1.0),
+            (Scale::UNIT, 0.5, "-3", 0.0),
+            (Scale::factor(100.0), 1.0, "250", 250.0),
+            (Scale::factor(100.0), 1.0, "-1", 0.0),
+            (ior, 1.5, "0", 0.01),
+            (ior, 1.5, "4", 4.0),
+            // A file may say it: it stays until another number is given.
+            (Scale::UNIT, 2.0, "", 2.0),
+        ] {
+            let show = |ui: &mut Ui, value: &mut f32| {
+                scale.show(ui, value);
+            };
+            // The row that it is in says what it is.
+            let mut harness = Harness::builder().with_accessibility_check(false).build_ui_state(show, from);
+            if !text.is_empty() {
+                harness.get_by_role(egui::Role::SpinButton).focus();
+                harness.step();
+                harness.event(egui::Event::Text(text.to_owned()));
+                harness.step();
+                harness.key_press(egui::Key::Enter);
+            }
+            harness.run();
+            assert_eq!(*harness.state(), to, "{from} {text:?}");
         }
     }
 

@@ -9,7 +9,7 @@ use sunfleck::scene::settings::{EnvironmentSettings, MaterialSettings, SceneLigh
 use sunfleck::scene::{PunctualKind, PunctualLight, Scene};
 
 use super::color::color;
-use super::number::{Number, drag_sized, log_slider, slider};
+use super::number::{Number, Scale, drag_sized};
 use super::widgets::{Name, back, choice, row};
 use crate::view::app::Viewer;
 use crate::view::files::{self, name_of};
@@ -118,31 +118,37 @@ pub fn environment(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
         Sky::Own { rotation, strength } => (rotation, strength),
         _ => (0.0, 1.0),
     };
-    let rows = [
-        (ROTATION, given.rotation_degrees, was.rotation_degrees, rotation),
-        (STRENGTH, given.strength, was.strength, strength),
+    let properties = [
+        Property { name: ROTATION, field: |sky| &mut sky.rotation_degrees, own: rotation, scale: TURN },
+        Property { name: STRENGTH, field: |sky| &mut sky.strength, own: strength, scale: Scale::factor(100.0) },
     ];
-    for (i, (name, value, old, default)) in rows.into_iter().enumerate() {
-        let mut shown = f64::from(value.unwrap_or(default));
+    for Property { name, field, own, scale } in properties {
+        let (value, old) = (*field(&mut given.clone()), *field(&mut was.clone()));
+        let mut shown = value.unwrap_or(own);
         let mut changed = false;
         let reset = row(ui, name, value != old, |ui| {
-            let range = if i == 0 { -180.0..=180.0 } else { 0.0..=100.0 };
-            let response = match i {
-                0 => slider(ui, &mut shown, Number::Degrees, range),
-                _ => log_slider(ui, &mut shown, Number::Plain, range),
-            };
+            let response = scale.show(ui, &mut shown);
             changed = response.changed();
             response
         });
         if changed || reset {
-            let value = if reset { old } else { Some(shown as f32) };
-            edit_sky(ui, viewer, name.name, read, |sky| match i {
-                0 => sky.rotation_degrees = value,
-                _ => sky.strength = value.map(|v| v.max(0.0)),
-            });
+            let value = if reset { old } else { Some(shown) };
+            edit_sky(ui, viewer, name.name, read, |sky| *field(sky) = value);
         }
     }
 }
+
+/// A number of the environment: where settings have it, what it is without them, what it may be.
+struct Property {
+    name: Name,
+    field: fn(&mut EnvironmentSettings) -> &mut Option<f32>,
+    own: f32,
+    scale: Scale,
+}
+
+/// Degrees; what is typed may be any number of turns.
+const TURN: Scale =
+    Scale { number: Number::Degrees, range: [-180.0, 180.0], is_logarithmic: false, allowed: [f32::MIN, f32::MAX] };
 
 /// Nothing is left where nothing is said.
 fn edit_sky(
@@ -164,15 +170,15 @@ pub fn lights(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     let Some(opened) = viewer.opened().cloned() else { return };
     let scene = &opened.loaded.scene;
     let now = viewer.settings();
-    let mut scale = f64::from(now.light_scale.unwrap_or(1.0));
+    let mut scale = now.light_scale.unwrap_or(1.0);
     let mut changed = false;
     let reset = row(ui, SCALE, now.light_scale != read.light_scale, |ui| {
-        let response = log_slider(ui, &mut scale, Number::Plain, 0.0..=100.0);
+        let response = Scale::factor(100.0).show(ui, &mut scale);
         changed = response.changed();
         response
     });
     if changed {
-        viewer.edit(ui, "light scale", |s| s.light_scale = Some((scale as f32).max(0.0)));
+        viewer.edit(ui, "light scale", |s| s.light_scale = Some(scale));
     }
     if reset {
         viewer.reset(ui, |s| s.light_scale = read.light_scale);
