@@ -82,13 +82,17 @@ pub fn srgb_encode(linear: f32) -> f32 {
 /// picture would be its noise's.
 ///
 /// It is measured in the logarithms of lit pixels, those brighter than 2⁻¹⁶ of the 90th percentile of what is above 0; of a
-/// large picture, of every how manieth gives 2¹⁸ at most. Of these the darkest and the brightest 2 % are left out, and the next 8 % on average are the darkest and the brightest:
-/// neither a black background nor a few fireflies move it, and a lamp that comes into view does little by little. A black
-/// picture gets 0.
+/// large picture, of one in each stretch of pixels of a length that gives 2¹⁸ at most, at another place in every stretch, so
+/// that all columns are looked at. Of these the darkest and the brightest 2 % are left out, and the next 8 % on average are
+/// the darkest and the brightest: neither a black background nor a few fireflies move it, and a lamp that comes into view
+/// does little by little. A black picture gets 0.
 pub fn automatic_exposure(rgb: &[[f32; 3]]) -> f32 {
     const MOST: usize = 1 << 18;
-    let some = rgb.iter().step_by(rgb.len().div_ceil(MOST).max(1));
-    let mut lit: Vec<f32> = some.map(|&c| luminance(c)).filter(|y| *y > 0.0 && y.is_finite()).collect();
+    /// 2³² over the golden ratio: the fractions of its multiples are spread evenly (Weyl).
+    const GOLDEN: u32 = 0x9E37_79B9;
+    let stretches = (0u32..).zip(rgb.chunks(rgb.len().div_ceil(MOST).max(1)));
+    let some = stretches.map(|(i, of)| of[((u64::from(GOLDEN.wrapping_mul(i)) * of.len() as u64) >> 32) as usize]);
+    let mut lit: Vec<f32> = some.map(luminance).filter(|y| *y > 0.0 && y.is_finite()).collect();
     if lit.is_empty() {
         return 0.0;
     }
@@ -168,6 +172,17 @@ mod tests {
     }
 
     #[test]
+    /// Stripes as far apart as the pixels that are looked at, or nearly, are seen as they are.
+    #[test]
+    fn exposure_of_a_large_picture_goes_by_all_its_columns() {
+        for (width, period) in [(1024, 4), (1024, 2), (1028, 257), (1000, 4)] {
+            let stripes = |x: usize| if x.is_multiple_of(period) { 64.0 } else { 0.25 };
+            let picture = |height: usize| -> Vec<_> { (0..width * height).map(|i| [stripes(i % width); 3]).collect() };
+            let [large, small] = [1024, 64].map(|height| automatic_exposure(&picture(height)));
+            assert!((large - small).abs() < 0.02, "{width} {period}: {large} {small}");
+        }
+    }
+
     fn exposure_ignores_background_and_fireflies() {
         let grey = vec![[0.36; 3]; 1000];
         assert!((automatic_exposure(&grey) + 1.0).abs() < 1e-5);
