@@ -42,6 +42,13 @@ use super::{Accelerator, Environment};
 
 /// Width and height of a picture, pixels, at most.
 pub const MAX_SIDE: u32 = 65_535;
+/// Exposure, stops up or down, at most.
+pub const MAX_EXPOSURE: f32 = 64.0;
+
+/// Whether alpha may be this: between 0 and 1, neither included.
+pub fn is_alpha(x: f32) -> bool {
+    x > 0.0 && x < 1.0
+}
 
 /// Reads the environment of a file, with warnings, as [`load_environment`](super::load::load_environment) does.
 pub type ReadEnvironment<'a> = dyn FnMut(&Path) -> Result<(Environment, Vec<String>), LoadError> + 'a;

@@ -1,8 +1,8 @@
 //! Checking of settings by themselves, and what they do to a scene.
 
 use super::{
-    CameraSettings, EnvironmentSettings, FirstRadius, LightKind, LightSettings, MAX_SIDE, ReadEnvironment, Settings,
-    SettingsError, Size, SphereSettings, Wrong,
+    CameraSettings, EnvironmentSettings, FirstRadius, LightKind, LightSettings, MAX_EXPOSURE, MAX_SIDE,
+    ReadEnvironment, Settings, SettingsError, Size, SphereSettings, Wrong, is_alpha,
 };
 use crate::scene::load::load_environment;
 use crate::scene::{
@@ -77,12 +77,13 @@ impl Settings {
                 format!("{width} × {height} is not within {MAX_SIDE} × {MAX_SIDE}")
             });
         }
-        c.number("alpha", self.alpha, |v| v > 0.0 && v < 1.0, "between 0 and 1");
+        c.number("alpha", self.alpha, is_alpha, "between 0 and 1");
         if let Some(FirstRadius::Fixed(radius)) = self.radius {
             c.positive("radius", Some(radius));
         }
         c.positive("seconds", self.seconds.map(|s| s as f32));
-        c.number("exposure", self.exposure, |v| v.abs() <= 64.0, "between -64 and 64");
+        let stops = format!("between -{MAX_EXPOSURE} and {MAX_EXPOSURE}");
+        c.number("exposure", self.exposure, |v| v.abs() <= MAX_EXPOSURE, &stops);
         c.require(self.max_segments != Some(0), "max_segments", || "0 is not a length".into());
         c.not_negative("light_scale", self.light_scale);
         if let Some(camera) = &self.camera {

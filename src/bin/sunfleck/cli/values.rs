@@ -4,7 +4,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use sunfleck::output::tonemap::ToneMap;
 use sunfleck::ppm::{Direct, FirstRadius, Kernel};
 use sunfleck::scene::Accelerator;
-use sunfleck::scene::settings::{Index, MAX_SIDE};
+use sunfleck::scene::settings::{Index, MAX_EXPOSURE, MAX_SIDE, is_alpha};
 
 /// The part of the picture to compute.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,14 +70,14 @@ pub fn noise(text: &str) -> Result<f64, String> {
 
 pub fn exposure(text: &str) -> Result<f32, String> {
     match number::<f32>(text)? {
-        x if x.abs() <= 60.0 => Ok(x),
-        _ => Err("must be between -60 and 60 stops".into()),
+        x if x.abs() <= MAX_EXPOSURE => Ok(x),
+        _ => Err(format!("must be between -{MAX_EXPOSURE} and {MAX_EXPOSURE} stops")),
     }
 }
 
 pub fn alpha(text: &str) -> Result<f32, String> {
     match number::<f32>(text)? {
-        x if x > 0.0 && x < 1.0 => Ok(x),
+        x if is_alpha(x) => Ok(x),
         _ => Err("must be between 0 and 1, neither included".into()),
     }
 }
@@ -119,6 +119,7 @@ pub fn accelerator() -> impl TypedValueParser<Value = Accelerator> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sunfleck::scene::settings::Settings;
 
     #[test]
     fn sizes_and_crops() {
@@ -135,6 +136,18 @@ mod tests {
         for wrong in ["", "1", "0,1,0", "0,1,0,2", "0.5,0.5,0,1", "0.6,0.5,0,1", "nan,1,0,1", "-0.1,1,0,1", "0,1,0,1,0"]
         {
             assert!(crop(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    /// What a file may say can be typed, and nothing else.
+    #[test]
+    fn flags_and_files_take_the_same_numbers() {
+        let in_file = |field: &str, text: &str| Settings::default().set(&format!("{field}={text}")).is_ok();
+        for text in ["0", "-60", "60", "61.5", "-64", "64", "64.1", "-65", "1000"] {
+            assert_eq!(exposure(text).is_ok(), in_file("exposure", text), "{text}");
+        }
+        for text in ["0", "1e-6", "0.0005", "0.5", "0.9995", "1", "1.5", "-0.5"] {
+            assert_eq!(alpha(text).is_ok(), in_file("alpha", text), "{text}");
         }
     }
 

@@ -10,7 +10,7 @@ use egui::Color32;
 use sunfleck::output::display::Look;
 use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::Camera;
-use sunfleck::scene::settings::Settings;
+use sunfleck::scene::settings::{MAX_EXPOSURE, Settings};
 
 use super::engine::{
     Choice, Engine, Limits, Message, Now, Opened, Phase, Save, Wake, Wanted, is_asked_anew, is_other_scene, is_same,
@@ -119,8 +119,8 @@ pub struct Viewer {
     pub show_help: bool,
     pub keyboard: super::keys::Keyboard,
     pub dialog: Option<files::Dialog>,
-    pub sky: Option<files::Sky>,
     pub screenshots: files::Screenshots,
+    pub sky: Option<files::Sky>,
     /// To be read.
     reference: Option<PathBuf>,
     pub pick: files::Pick,
@@ -158,9 +158,9 @@ impl Viewer {
             show_help: false,
             keyboard: Default::default(),
             dialog: None,
+            screenshots: Default::default(),
             sky: None,
             reference: first.reference,
-            screenshots: Default::default(),
             pick: Arc::new(files::pick),
             selected: None,
             had_popup: false,
@@ -284,7 +284,9 @@ impl Viewer {
     /// Brightens the picture by so many stops.
     pub fn expose(&mut self, ui: &egui::Ui, stops: f32) {
         let now = self.look().exposure.or(self.now.painted.as_ref().map(|painted| painted.exposure));
-        self.show_otherwise(ui, "exposure", |s| s.exposure = Some((now.unwrap_or(0.0) + stops).clamp(-64.0, 64.0)));
+        self.show_otherwise(ui, "exposure", |s| {
+            s.exposure = Some((now.unwrap_or(0.0) + stops).clamp(-MAX_EXPOSURE, MAX_EXPOSURE))
+        });
     }
 
     /// Changes settings that only say how the picture is shown: nothing is rendered for it.
@@ -499,17 +501,17 @@ impl Viewer {
                 match before.filter(|before| self.wanted.reads_again && before.choice == opened.choice) {
                     Some(before) => {
                         self.selected = selected.and_then(|(i, before)| opened.material_as(&before, i));
-                        self.edits.map(|edited| edited.rebased(&before.source.settings, settings));
-                        self.wanted.settings = self.wanted.settings.take().map(|_| Arc::clone(self.edits.now()));
                         let limits = |settings: &Settings| (settings.iterations, settings.seconds);
                         if limits(&before.source.settings) != limits(settings) {
                             self.wanted.limits = self.limits.of_next(self.wanted.limits, settings);
                         }
+                        self.edits.map(|edited| edited.rebased(&before.source.settings, settings));
+                        self.wanted.settings = self.wanted.settings.take().map(|_| Arc::clone(self.edits.now()));
                     }
                     None => {
+                        self.wanted.limits = self.limits.of_next(self.wanted.limits, settings);
                         self.edits = Edits::new(settings.clone());
                         self.wanted.settings = None;
-                        self.wanted.limits = self.limits.of_next(self.wanted.limits, settings);
                         self.picture = PictureView::default();
                     }
                 }

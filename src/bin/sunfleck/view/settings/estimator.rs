@@ -4,7 +4,7 @@ use eframe::egui;
 use egui::Ui;
 use sunfleck::ppm::Params;
 use sunfleck::scene::Accelerator;
-use sunfleck::scene::settings::{Count, Direct, FirstRadius, Index, Kernel, Settings};
+use sunfleck::scene::settings::{Count, Direct, FirstRadius, Index, Kernel, Settings, is_alpha};
 
 use super::number::{NO_LIMIT, Number, log_slider, metres, rounded, slider, whole};
 use super::widgets::{Name, choice, row};
@@ -95,8 +95,8 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
         changed = response.changed();
         response
     });
-    if changed {
-        viewer.edit(ui, "alpha", |s| s.alpha = Some((alpha as f32).clamp(1e-3, 0.999)));
+    if changed && is_alpha(alpha as f32) {
+        viewer.edit(ui, "alpha", |s| s.alpha = Some(alpha as f32));
     }
     if reset {
         viewer.reset(ui, |s| s.alpha = read.alpha);

@@ -3,7 +3,7 @@
 use eframe::egui;
 use egui::{DragValue, Ui};
 use sunfleck::output::tonemap::ToneMap;
-use sunfleck::scene::settings::{MAX_SIDE, Settings, Size};
+use sunfleck::scene::settings::{MAX_EXPOSURE, MAX_SIDE, Settings, Size};
 
 use super::number::{Number, slider, whole};
 use super::widgets::{Name, choice, named, row};
@@ -120,7 +120,7 @@ fn exposure(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     row(ui, STOPS, false, |ui| {
         let response = slider(ui, &mut stops, Number::Stops, -10.0..=10.0);
         if response.changed() {
-            exposure = Some((stops as f32).clamp(-64.0, 64.0));
+            exposure = Some((stops as f32).clamp(-MAX_EXPOSURE, MAX_EXPOSURE));
             changed = true;
         }
         if response.has_focus() {

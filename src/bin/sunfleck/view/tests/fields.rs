@@ -134,6 +134,11 @@ fn what_is_typed_is_kept_in_full() {
     assert_eq!(now(&mut window).environment.clone().unwrap().rotation_degrees, Some(37.25));
     enter(&mut window, "Alpha", 0, "0.12345");
     assert_eq!(now(&mut window).alpha, Some(0.12345));
+    enter(&mut window, "Alpha", 0, "0.9995");
+    assert_eq!(now(&mut window).alpha, Some(0.9995));
+    // What no file may say is not taken.
+    enter(&mut window, "Alpha", 0, "1");
+    assert_eq!(now(&mut window).alpha, Some(0.9995));
     enter(&mut window, "Photons", 0, "54321");
     assert_eq!(now(&mut window).photons, Some(Count(54_321)));
     enter(&mut window, "Stops", 0, "0.33");
