@@ -96,6 +96,7 @@ impl Job {
     pub fn load(&self, args: &RenderArgs) -> Result<Input> {
         let input = prepare(&self.source, &self.source.settings, self.source.scene()?, &args.input)?;
         check_memory(&input.params, None)?;
+        check_scene_memory(&input.scene).with_context(|| self.source.name.clone())?;
         Ok(input)
     }
 }
@@ -240,12 +241,9 @@ pub fn check_memory(params: &Params, held: Option<&Params>) -> Result<()> {
     if held.is_some_and(|held| needed(params).iter().zip(needed(held)).all(|(needs, has)| *needs <= has)) {
         return Ok(());
     }
-    let gib = |bytes: u64| bytes as f64 / f64::from(1 << 30);
     let [width, height] = params.film_size();
-    let what = [
-        format!("a picture of {width}x{height} pixels"),
-        format!("{} photon paths an iteration", params.n_paths),
-    ];
+    let what =
+        [format!("a picture of {width}x{height} pixels"), format!("{} photon paths an iteration", params.n_paths)];
     let available = available_memory().saturating_add(held.map_or(0, |held| needed(held).iter().sum()));
     for (bytes, what) in needed(params).into_iter().zip(what) {
         ensure!(
@@ -256,6 +254,25 @@ pub fn check_memory(params: &Params, held: Option<&Params>) -> Result<()> {
         );
     }
     Ok(())
+}
+
+/// Refuses a scene that this machine has no room to build a tree over.
+pub fn check_scene_memory(scene: &Scene) -> Result<()> {
+    // Measured with two million, flat triangles and tree, while it is built.
+    const TRIANGLE: u64 = 250;
+    let n: u64 = scene.meshes.iter().map(|mesh| mesh.triangles.len() as u64).sum();
+    let (needs, available) = (n.saturating_mul(TRIANGLE), available_memory());
+    ensure!(
+        needs <= available,
+        "the tree over {n} triangles would need some {:.1} GiB of memory; {:.1} GiB are free",
+        gib(needs),
+        gib(available)
+    );
+    Ok(())
+}
+
+fn gib(bytes: u64) -> f64 {
+    bytes as f64 / f64::from(1 << 30)
 }
 
 /// Bytes for the picture, and for the photons of an iteration.

@@ -14,7 +14,7 @@ use scene::SceneBuffers;
 
 use super::Method;
 use super::buffers::{Array, Readback};
-use super::context::Context;
+use super::context::{Context, DeviceKind};
 use super::hardware::Hardware;
 use super::index::{Index, Sorted};
 use super::kernels::{ACCELERATION_STRUCTURE, Access, Batch, Kernel, Modules, Shared};
@@ -37,8 +37,8 @@ const MOST_PIXELS: u32 = 1 << 19;
 /// Seconds a dispatch may take unless the caller says, well below what watchdogs allow.
 const DISPATCH_SECONDS: f64 = 0.1;
 /// The same with an interrupt, which takes effect between two; whoever shares the device has a turn there, and two are with
-/// the device at a time.
-const INTERRUPTIBLE_SECONDS: f64 = 0.004;
+/// the device at a time. Of software a turn is had at any time, and it loses more by each.
+const INTERRUPTIBLE_SECONDS: [f64; 2] = [0.004, 0.01];
 
 // The stages that are timed.
 const EYE: usize = 0;
@@ -153,7 +153,7 @@ impl GpuStages {
     }
 
     /// How long one dispatch of eye paths, photon paths or the gather is to take at most, seconds (if never called 0.1, or
-    /// 0.004 with an interrupt): short ones let whoever shares the device have a turn. It is aimed at from what those before
+    /// 0.004 with an interrupt, on software 0.01): short ones let whoever shares the device have a turn. It is aimed at from what those before
     /// took, down to a smallest dispatch, and changes no bit of the picture.
     pub fn set_dispatch_seconds(&mut self, seconds: f64) {
         self.dispatch_seconds = seconds.max(0.0);
@@ -281,7 +281,9 @@ impl Stages for GpuStages {
 
     fn set_interrupt(&mut self, interrupt: Interrupt) {
         if interrupt.is_set() {
-            self.set_dispatch_seconds(self.dispatch_seconds.min(INTERRUPTIBLE_SECONDS));
+            let is_software = self.context.info().kind == DeviceKind::Cpu;
+            let most = INTERRUPTIBLE_SECONDS[usize::from(is_software)];
+            self.set_dispatch_seconds(self.dispatch_seconds.min(most));
         }
         self.shared.interrupt = interrupt;
     }

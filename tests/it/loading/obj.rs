@@ -1,8 +1,13 @@
 //! OBJ and MTL.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use super::{Folder, png};
 use glam::{Vec2, Vec3, Vec4};
+use sunfleck::ppm::Interrupt;
 use sunfleck::scene::AlphaMode;
+use sunfleck::scene::load::{LoadError, load_unless};
 
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
@@ -146,4 +151,31 @@ fn vertex_colours_are_srgb() {
     let colors = &loaded.scene.meshes[0].colors;
     assert!(colors[0].abs_diff_eq(Vec4::new(1.0, 0.0, 0.21404, 1.0), 1e-4));
     assert_eq!((colors[1], colors[2]), (Vec4::ONE, Vec4::new(0.0, 0.0, 0.0, 1.0)));
+}
+
+#[test]
+fn reading_ends_when_nobody_wants_the_scene() {
+    let folder = Folder::new();
+    let file = folder.write("scene.obj", SQUARE.repeat(5000) + "f 1 2 3\n");
+    let asked = Arc::new(AtomicU32::new(0));
+    for most in 0..5 {
+        let count = Arc::clone(&asked);
+        let interrupt = Interrupt::when(move || count.fetch_add(1, Ordering::Relaxed) >= most);
+        assert!(matches!(load_unless(&file, &interrupt), Err(LoadError::Interrupted)), "{most}");
+        assert_eq!(asked.swap(0, Ordering::Relaxed), most + 1);
+    }
+    assert_eq!(load_unless(&file, &Interrupt::default()).unwrap().scene.meshes.len(), 1);
+}
+
+#[test]
+fn a_scene_too_far_away_for_its_size_is_told() {
+    for (offset, is_told) in [(0.0, false), (1e3, false), (1e5, true)] {
+        let text = format!("v {offset} 0 0\nv {0} 0 0\nv {0} 10 0\nf 1 2 3\n", offset + 10.0);
+        let warnings = Folder::new().load("scene.obj", text).warnings;
+        assert_eq!(
+            warnings.iter().any(|warning| warning.contains("from the origin")),
+            is_told,
+            "{offset}: {warnings:?}"
+        );
+    }
 }

@@ -430,7 +430,8 @@ fn searched_in_both_ways(device: Device, other: &str) -> [Film; 2] {
         now.estimate > before.estimate && now.phase == Phase::Reached && iterations(now) == Some(2)
     });
     let frame = after.frame.unwrap();
-    let command = frame.opened.command(&frame.opened.source.name, &frame.settings, "--backend x", 2, Path::new("a.exr"));
+    let command =
+        frame.opened.command(&frame.opened.source.name, &frame.settings, "--backend x", 2, Path::new("a.exr"));
     assert!(command.contains(" --backend x ") && command.contains(&format!(" --set {other} ")), "{command}");
     [before.frame.unwrap(), frame].map(|frame| frame.film.as_ref().clone())
 }

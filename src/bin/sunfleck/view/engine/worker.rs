@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 use sunfleck::layout;
 use sunfleck::ppm::{Error, Params};
 use sunfleck::scene::settings::{Index, Settings};
@@ -127,7 +127,8 @@ impl Have {
             });
             let Some(choice) = wanted.scene.clone() else { return Ok(()) };
             let is_left = |board: &Board| is_other_scene(wanted, &board.wanted);
-            let Some(opened) = self.reader.read(shared, move |interrupt| reading::open(&choice, interrupt), is_left)? else {
+            let Some(opened) = self.reader.read(shared, move |interrupt| reading::open(&choice, interrupt), is_left)?
+            else {
                 return Ok(());
             };
             let opened = Arc::new(opened);
@@ -176,6 +177,9 @@ impl Have {
             None => {
                 let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
                 job::check_memory(&input.params, self.session.as_ref().map(|session| &session.input.params))?;
+                if self.session.is_none() {
+                    job::check_scene_memory(&input.scene).with_context(|| opened.source.name.clone())?;
+                }
                 shared.update(|board| board.phase = Phase::Preparing);
                 let before = self.session.take();
                 // What has been said of this scene is not said again at every change.

@@ -1,6 +1,7 @@
 //! Numbers as the panel shows and reads them. What is typed is kept in full, however few digits are shown, and text left as
 //! it was shown changes nothing.
 
+use std::borrow::Cow;
 use std::ops::RangeInclusive;
 
 use eframe::egui;
@@ -62,6 +63,8 @@ impl Number {
                 .find_map(|(name, metres)| Some((text.strip_suffix(name)?, *metres)))
                 .unwrap_or((&text, 1.0)),
         };
+        // As much of the world writes it; nobody groups the digits of what is typed here.
+        let number = if number.contains('.') { Cow::Borrowed(number) } else { number.replacen(',', ".", 1).into() };
         // `parse` would also take "nan", and what no setting can hold.
         let value = number.parse::<f64>().ok()? * unit;
         (value as f32).is_finite().then_some(value)
@@ -310,12 +313,14 @@ mod tests {
                 let text = number.text(x);
                 assert_eq!(number.read(&text), Some(x), "{text}");
             }
-            for text in ["", "m", "nan", "inf", "1e300", "1 2 x", "1 kg"] {
+            for text in ["", "m", "nan", "inf", "1e300", "1 2 x", "1 kg", "1,2,3", "1,2.3"] {
                 assert_eq!(number.read(text), None, "{number:?} {text}");
             }
         }
         for (number, text, value) in [
             (Metres, "5 mm", 0.005),
+            (Plain, "0,7", 0.7),
+            (Coordinate(2), "-2,5 cm", -0.025),
             (Metres, "7 µm", 7e-6),
             (Metres, "2.5cm", 0.025),
             (Coordinate(2), "−3 km", -3000.0),
