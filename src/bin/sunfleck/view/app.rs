@@ -95,7 +95,6 @@ pub struct Viewer {
     /// Whether it has been in a window.
     entered: bool,
     pub picture: PictureView,
-    pub inspect: super::inspect::InspectView,
     pub compare: super::compare::CompareView,
     /// Index into the scene's materials.
     pub selected: Option<usize>,
@@ -143,7 +142,6 @@ impl Viewer {
             remembered: Remembered::default(),
             entered: false,
             picture: PictureView::default(),
-            inspect: Default::default(),
             compare: Default::default(),
             saved_as,
             last_save: LastSave::default(),
@@ -493,6 +491,7 @@ impl Viewer {
             let before = std::mem::replace(&mut self.editing, self.now.opened.clone());
             let selected = self.selected.take().zip(before.clone());
             self.picture.forget();
+            self.compare.forget();
             if let Some(opened) = self.editing.clone() {
                 if let Some(path) = &opened.source.canonical {
                     self.remembered.opened(path);

@@ -1,17 +1,16 @@
 //! The picture beside a reference: an .exr, or the picture of a moment ago.
 
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 use eframe::egui;
-use egui::{Color32, Key, PointerButton, Rect, Response, Stroke, pos2};
+use egui::{Color32, ColorImage, Key, PointerButton, Rect, Response, Stroke, pos2};
 use sunfleck::output;
 use sunfleck::output::difference::Measure;
-use sunfleck::output::tonemap::ToneMap;
 
 use super::app::Viewer;
 use super::charts::short;
-use super::engine::{Comparison, Message, Painted, Reference, View, is_same};
+use super::engine::{Comparison, Message, Reference, View};
 use super::files;
 use super::inspect::{row, table};
 use super::keys::Keyboard;
@@ -25,9 +24,10 @@ pub struct CompareView {
     wipe: f32,
     /// What the line is held by, as it was last drawn.
     hold: Option<Rect>,
-    texture: Option<(Made, egui::TextureHandle)>,
+    /// And what it was made from.
+    texture: Option<(Weak<ColorImage>, egui::TextureHandle)>,
     /// The reference that was last looked at.
-    seen: Option<Arc<Reference>>,
+    seen: Option<Weak<Reference>>,
 }
 
 impl Default for CompareView {
@@ -37,33 +37,22 @@ impl Default for CompareView {
 }
 
 impl CompareView {
-    /// The texture is of a window that is gone.
+    /// The texture is of a scene or a window that goes.
     pub fn forget(&mut self) {
         self.texture = None;
     }
-}
 
-/// What a texture of the reference was made from.
-struct Made {
-    reference: Arc<Reference>,
-    exposure: f32,
-    tonemap: ToneMap,
-    stops: bool,
-}
-
-impl Made {
-    fn of(painted: &Painted, reference: &Arc<Reference>) -> Self {
-        Self {
-            reference: Arc::clone(reference),
-            exposure: painted.exposure,
-            tonemap: painted.painting.look.tonemap,
-            stops: painted.painting.view == View::Stops,
+    /// The texture of `image`.
+    fn take(&mut self, ctx: &egui::Context, image: &Arc<ColorImage>) -> egui::TextureId {
+        let options = egui::TextureOptions { magnification: egui::TextureFilter::Nearest, ..Default::default() };
+        let (of, texture) = self.texture.get_or_insert_with(|| {
+            (Arc::downgrade(image), ctx.load_texture("reference", Arc::clone(image), options))
+        });
+        if of.as_ptr() != Arc::as_ptr(image) {
+            texture.set(Arc::clone(image), options);
+            *of = Arc::downgrade(image);
         }
-    }
-
-    fn is(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.reference, &other.reference)
-            && (self.exposure, self.tonemap, self.stops) == (other.exposure, other.tonemap, other.stops)
+        texture.id()
     }
 }
 
@@ -112,7 +101,8 @@ impl Viewer {
     /// Says it of a reference that is new.
     pub fn look_at_reference(&mut self, ui: &egui::Ui) {
         let reference = self.now.reference.clone();
-        let is_same = is_same(self.compare.seen.as_ref(), reference.as_ref());
+        let seen = self.compare.seen.as_ref().map(Weak::as_ptr);
+        let is_same = seen == reference.as_ref().map(Arc::as_ptr);
         // The picture's size is known once there is a scene.
         if is_same || reference.is_some() && self.full_size().is_none() {
             return;
@@ -120,7 +110,7 @@ impl Viewer {
         if let (Some(_), Some(why)) = (&reference, self.no_comparison()) {
             self.say(ui, Message::Warning(why));
         }
-        self.compare.seen = reference;
+        self.compare.seen = reference.as_ref().map(Arc::downgrade);
     }
 }
 
@@ -239,8 +229,12 @@ pub fn overlay(
         viewer.compare.hold = held_before;
     }
     let painted = viewer.picture.painted().cloned()?;
-    let (reference, _) = painted.reference.as_ref()?;
-    let (size, rgba) = painted.reference_texture()?;
+    let (Some((reference, _)), Some(image)) = (&painted.reference, painted.reference_texture()) else {
+        if viewer.now.reference.is_none() {
+            viewer.compare.forget();
+        }
+        return None;
+    };
     let visible = rect.intersect(painter.clip_rect());
     let is_asked = is_asked_for(ui, &viewer.keyboard, visible);
     let is_wiped = painted.painting.comparison == Comparison::Wipe;
@@ -248,15 +242,9 @@ pub fn overlay(
         return None;
     }
     let view = &mut viewer.compare;
-    let made = Made::of(&painted, reference);
-    if !view.texture.as_ref().is_some_and(|(of, _)| of.is(&made)) {
-        let image = egui::ColorImage::from_rgba_unmultiplied(size, rgba);
-        let options = egui::TextureOptions { magnification: egui::TextureFilter::Nearest, ..Default::default() };
-        view.texture = Some((made, ui.ctx().load_texture("reference", image, options)));
-    }
-    let (_, texture) = view.texture.as_ref()?;
+    let texture = view.take(ui.ctx(), image);
     if is_asked {
-        painter.image(texture.id(), rect, uv(0.0), Color32::WHITE);
+        painter.image(texture, rect, uv(0.0), Color32::WHITE);
         name(painter, visible.left_top(), egui::Align2::LEFT_TOP, &reference.name);
         return Some(f32::NEG_INFINITY);
     }
@@ -270,7 +258,7 @@ pub fn overlay(
     let is_held = handle.is_some_and(|handle| handle.dragged_by(PointerButton::Primary));
     let is_marked = is_held || handle.is_some_and(|handle| handle.hovered() && !handle.dragged());
     let right = Rect::from_min_max(pos2(x, rect.top()), rect.max);
-    painter.image(texture.id(), right, uv(from), Color32::WHITE);
+    painter.image(texture, right, uv(from), Color32::WHITE);
     let (width, color) = if is_marked { (2.5, Color32::WHITE) } else { (1.5, Color32::LIGHT_GRAY) };
     painter.vline(x + 1.0, visible.y_range(), Stroke::new(width + 1.0, Color32::from_black_alpha(140)));
     painter.vline(x, visible.y_range(), Stroke::new(width, color));

@@ -1,7 +1,5 @@
 //! The panel on the right: what is shown, and the numbers behind it.
 
-use std::sync::Arc;
-
 use eframe::egui;
 use egui::{Color32, RichText};
 use glam::{Vec2, Vec3};
@@ -24,35 +22,6 @@ const NONE: &str = "–";
 /// Why there is no view to choose.
 const NO_VIEW: &str =
     "A difference is shown in the place of a view, which comes back with Off or Wipe under Compare (C)";
-
-/// Numbers over all of a picture, which are not counted anew in every frame of the window.
-#[derive(Default)]
-pub struct InspectView {
-    of: Option<Arc<Painted>>,
-    /// Metres; none if nothing gathers.
-    mean_radius: Option<f32>,
-    /// Powers of the photons, W before the division by the number of paths.
-    powers: Option<[f32; 2]>,
-}
-
-impl InspectView {
-    fn take(&mut self, painted: &Arc<Painted>) {
-        if self.of.as_ref().is_some_and(|of| Arc::ptr_eq(of, painted)) {
-            return;
-        }
-        let frame = &painted.frame;
-        let (mut sum, mut n) = (0.0, 0u32);
-        for radius in frame.first_radii.gathering() {
-            sum += f64::from(radius);
-            n += 1;
-        }
-        self.mean_radius = (n > 0).then(|| (sum / f64::from(n)) as f32 * shrunk(painted));
-        let by_power = painted.painting.photons == Some(ColorBy::Power);
-        let insides = frame.insides.as_ref().filter(|_| by_power);
-        self.powers = insides.map(|insides| inspect::power_range(&insides.photons));
-        self.of = Some(Arc::clone(painted));
-    }
-}
 
 /// Radius of now over the first.
 fn shrunk(painted: &Painted) -> f32 {
@@ -84,9 +53,6 @@ impl Viewer {
 
 pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
     let painted = viewer.picture.painted().cloned();
-    if let Some(painted) = &painted {
-        viewer.inspect.take(painted);
-    }
     let painted = painted.as_deref();
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         section(ui, "View", |ui| view(ui, viewer, painted));
@@ -195,7 +161,7 @@ fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
         match color_by {
             ColorBy::Power => {
                 let per_path = 1.0 / painted.frame.params.n_paths.max(1) as f32;
-                let range = viewer.inspect.powers.unwrap_or([1.0; 2]).map(|power| power * per_path);
+                let range = painted.powers.unwrap_or([1.0; 2]).map(|power| power * per_path);
                 let map = |t| rgb(inspect::power_color(t));
                 bar(ui, "Power of a photon", range, true, "W a photon", map);
             }
@@ -391,6 +357,7 @@ fn selection(ui: &mut egui::Ui, viewer: &mut Viewer) {
 
 /// Of all pixels and photons.
 fn whole(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
+    let mean_radius = painted.and_then(|painted| painted.frame.mean_radius);
     table(ui, "whole", |ui| {
         let last = viewer.engine().history(|history| history.records.last().copied());
         let count = |n: u32| n.to_string();
@@ -399,7 +366,7 @@ fn whole(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
         let each =
             last.filter(|l| l.n_paths > 0).map(|l| format!("{:.3}", f64::from(l.n_photons) / f64::from(l.n_paths)));
         row(ui, "Photons a path", each, "Stored, on average");
-        row(ui, "Mean radius", viewer.inspect.mean_radius.map(length), "Of the pixels' estimates, now");
+        row(ui, "Mean radius", mean_radius.map(length), "Of the pixels' estimates, now");
     });
     if let Some(painted) = painted {
         ui.add_space(4.0);

@@ -87,8 +87,7 @@ impl PictureView {
         if self.painted.as_ref().is_some_and(|now| Arc::ptr_eq(now, painted)) {
             return;
         }
-        let (size, rgba) = painted.texture();
-        let image = egui::ColorImage::from_rgba_unmultiplied(size, rgba);
+        let image = Arc::clone(painted.texture());
         let options = egui::TextureOptions {
             magnification: egui::TextureFilter::Nearest,
             minification: egui::TextureFilter::Linear,
@@ -246,11 +245,12 @@ fn values(painter: &egui::Painter, area: Rect, rect: Rect, painted: &Painted, re
             let corner = rect.min + vec2(x as f32, y as f32) * side;
             let middle = corner + Vec2::splat(0.5 * side);
             let reference = painted.reference.as_ref().filter(|_| reference_from.is_some_and(|from| middle.x > from));
-            let (rgba, value) = match reference {
-                Some((_, rgba)) => (rgba, painted.reference_value(x, y)),
-                None => (&painted.rgba, painted.value(x, y)),
+            let (image, value) = match reference {
+                Some((_, image)) => (image, painted.reference_value(x, y)),
+                None => (&painted.image, painted.value(x, y)),
             };
-            let shade = rgba[4 * i..4 * i + 3].iter().map(|&c| u32::from(c)).sum::<u32>();
+            let [r, g, b, _] = image.pixels[i].to_array();
+            let shade = [r, g, b].map(u32::from).iter().sum::<u32>();
             let color = if shade > 384 { egui::Color32::BLACK } else { egui::Color32::WHITE };
             let lines: Vec<String> = value.iter().map(|&v| short(v)).collect();
             painter.text(

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use anyhow::Result;
+use eframe::egui::{Color32, ColorImage};
 use rayon::prelude::*;
-use sunfleck::inspect::{self, FirstHits};
+use sunfleck::inspect::{self, ColorBy, FirstHits};
 use sunfleck::layout::Photon;
 use sunfleck::output::Picture;
 use sunfleck::output::compare::{Difference, compare};
@@ -14,7 +15,7 @@ use sunfleck::output::display::{self, Look};
 use sunfleck::output::false_colour::{self, Scale};
 use sunfleck::output::flip::{self, flip};
 use sunfleck::output::histogram::Histogram;
-use sunfleck::output::tonemap::srgb_encode;
+use sunfleck::output::tonemap::{ToneMap, srgb_encode};
 use sunfleck::ppm::film::luminance;
 
 use super::{Frame, Reference};
@@ -138,7 +139,7 @@ pub struct Painting {
     pub view: View,
     pub comparison: Comparison,
     /// Photons drawn over the picture.
-    pub photons: Option<inspect::ColorBy>,
+    pub photons: Option<ColorBy>,
     /// Those that something hides too: behind glass, in the next room.
     pub hidden_photons: bool,
 }
@@ -155,8 +156,8 @@ impl Painting {
 pub struct Painted {
     /// Pixels.
     pub size: [usize; 2],
-    /// sRGB-encoded, opaque, row-major.
-    pub rgba: Vec<u8>,
+    /// Opaque; as the texture is made from it, so that the interface hands it on and copies nothing.
+    pub image: Arc<ColorImage>,
     /// What it was made from.
     pub frame: Arc<Frame>,
     pub painting: Painting,
@@ -166,7 +167,9 @@ pub struct Painted {
     pub legend: Option<Legend>,
     pub histogram: Histogram,
     /// The reference as the picture is shown.
-    pub reference: Option<(Arc<Reference>, Vec<u8>)>,
+    pub reference: Option<(Arc<Reference>, Arc<ColorImage>)>,
+    /// Least and greatest power of the photons that are drawn by power, W before the division by the number of paths.
+    pub powers: Option<[f32; 2]>,
     /// Mean of the comparison that is shown.
     pub mean: Option<f64>,
     /// The film against the reference; none of a preview.
@@ -180,25 +183,21 @@ pub struct Painted {
 /// A picture with fewer pixels, for a window whose textures are small.
 #[derive(Debug)]
 pub struct Reduced {
-    pub size: [usize; 2],
-    pub rgba: Vec<u8>,
+    pub image: Arc<ColorImage>,
     /// The reference, as small.
-    pub reference: Option<Vec<u8>>,
+    pub reference: Option<Arc<ColorImage>>,
 }
 
 impl Painted {
-    /// What fits into a texture: size, and bytes as in `rgba`.
-    pub fn texture(&self) -> ([usize; 2], &[u8]) {
-        self.reduced.as_ref().map_or((self.size, &self.rgba), |reduced| (reduced.size, &reduced.rgba))
+    /// What fits into a texture.
+    pub fn texture(&self) -> &Arc<ColorImage> {
+        self.reduced.as_ref().map_or(&self.image, |reduced| &reduced.image)
     }
 
     /// The same of the reference, whose size is the picture's.
-    pub fn reference_texture(&self) -> Option<([usize; 2], &[u8])> {
-        let (_, rgba) = self.reference.as_ref()?;
-        match &self.reduced {
-            Some(reduced) => Some((reduced.size, reduced.reference.as_deref()?)),
-            None => Some((self.size, rgba)),
-        }
+    pub fn reference_texture(&self) -> Option<&Arc<ColorImage>> {
+        let (_, image) = self.reference.as_ref()?;
+        self.reduced.as_ref().map_or(Some(image), |reduced| reduced.reference.as_ref())
     }
 
     /// The comparison that is shown in the place of the view, if one is.
@@ -210,9 +209,9 @@ impl Painted {
 
     pub fn reduce(&mut self, most_side: Option<usize>) {
         let Some(most) = most_side.filter(|&most| self.size.iter().any(|&side| side > most)) else { return };
-        let (size, rgba) = reduced(self.size, &self.rgba, most);
-        let reference = self.reference.as_ref().map(|(_, rgba)| reduced(self.size, rgba, most).1);
-        self.reduced = Some(Reduced { size, rgba, reference });
+        let small = |image: &ColorImage| Arc::new(reduced(image, most));
+        let reference = self.reference.as_ref().map(|(_, image)| small(image));
+        self.reduced = Some(Reduced { image: small(&self.image), reference });
     }
 
     /// Of a pixel: red, green and blue, or one number.
@@ -255,6 +254,16 @@ const STOPS: [f32; 2] = [-8.0, 8.0];
 pub struct Painter {
     halves: (u64, Halves),
     hits: Option<(Arc<Frame>, FirstHits)>,
+    reference: Option<ReferenceImage>,
+}
+
+/// A reference as it is shown.
+struct ReferenceImage {
+    of: Arc<Reference>,
+    exposure: f32,
+    tonemap: ToneMap,
+    in_stops: bool,
+    image: Arc<ColorImage>,
 }
 
 /// Colours, and what they stand for.
@@ -267,7 +276,7 @@ struct Colours {
 
 impl Painter {
     pub fn is_empty(&self) -> bool {
-        self.hits.is_none() && self.halves.1 == Halves::default()
+        self.hits.is_none() && self.reference.is_none() && self.halves.1 == Halves::default()
     }
 
     /// Error estimated from the halves, and measured against the reference, or why it cannot be.
@@ -292,17 +301,7 @@ impl Painter {
     pub fn paint(&mut self, frame: &Arc<Frame>, reference: Option<Arc<Reference>>, painting: Painting) -> Painted {
         let picture = frame.picture();
         let exposure = painting.look.exposure_of(&picture.rgb);
-        let tonemap = painting.look.tonemap;
-        let reference = fitting(reference.as_ref(), frame).map(|reference| {
-            let mut rgba = vec![];
-            match painting.view {
-                View::Stops => {
-                    false_colour::luminance_in_stops(&reference.picture.rgb, exposure, STOPS, &mut rgba);
-                }
-                _ => display::rgba8(&reference.picture, exposure, tonemap, &mut rgba),
-            }
-            (Arc::clone(reference), rgba)
-        });
+        let reference = self.reference(fitting(reference.as_ref(), frame), painting, exposure);
         let histogram = Histogram::of(&picture.rgb, exposure);
         let mut problem = None;
         let compared = reference.as_ref().and_then(|(reference, _)| {
@@ -313,7 +312,9 @@ impl Painter {
             Some(colours) => colours,
             None => self.view(frame, picture, painting, exposure),
         };
+        let mut powers = None;
         if let (Some(color), Some(insides)) = (painting.photons, &frame.insides) {
+            powers = (color == ColorBy::Power).then(|| inspect::power_range(&insides.photons));
             let style = inspect::Style { color, through: painting.hidden_photons, ..Default::default() };
             let dots = inspect::draw(&insides.photons, self.hits(frame), &style);
             for (to, from) in colours.rgba.chunks_exact_mut(4).zip(&dots) {
@@ -322,9 +323,10 @@ impl Painter {
                 }
             }
         }
+        let size = frame.params.film_size().map(|n| n as usize);
         Painted {
-            size: frame.params.film_size().map(|n| n as usize),
-            rgba: colours.rgba,
+            size,
+            image: Arc::new(image(size, &colours.rgba)),
             frame: Arc::clone(frame),
             painting,
             exposure,
@@ -332,11 +334,40 @@ impl Painter {
             legend: colours.legend,
             histogram,
             reference,
+            powers,
             mean: colours.mean,
             figures: None,
             problem,
             reduced: None,
         }
+    }
+
+    /// The reference as the picture is shown; made again only where that has changed.
+    fn reference(
+        &mut self,
+        reference: Option<&Arc<Reference>>,
+        painting: Painting,
+        exposure: f32,
+    ) -> Option<(Arc<Reference>, Arc<ColorImage>)> {
+        let (tonemap, in_stops) = (painting.look.tonemap, painting.view == View::Stops);
+        let before = self.reference.take();
+        let reference = reference?;
+        let is_same = |before: &ReferenceImage| {
+            Arc::ptr_eq(&before.of, reference)
+                && (before.exposure, before.tonemap, before.in_stops) == (exposure, tonemap, in_stops)
+        };
+        let now = before.filter(is_same).unwrap_or_else(|| {
+            let mut rgba = vec![];
+            match in_stops {
+                true => false_colour::luminance_in_stops(&reference.picture.rgb, exposure, STOPS, &mut rgba),
+                false => display::rgba8(&reference.picture, exposure, tonemap, &mut rgba),
+            }
+            let size = reference.picture.crop_size();
+            ReferenceImage { of: Arc::clone(reference), exposure, tonemap, in_stops, image: image(size, &rgba).into() }
+        });
+        let image = Arc::clone(&now.image);
+        self.reference = Some(now);
+        Some((Arc::clone(reference), image))
     }
 
     fn view(&mut self, frame: &Arc<Frame>, picture: Picture, painting: Painting, exposure: f32) -> Colours {
@@ -407,24 +438,31 @@ impl Painter {
     }
 }
 
+/// From bytes with an alpha of 255 to what textures are made from.
+fn image(size: [usize; 2], rgba: &[u8]) -> ColorImage {
+    let pixels = rgba.par_chunks_exact(4).with_min_len(1 << 14).map(|c| Color32::from_rgb(c[0], c[1], c[2])).collect();
+    ColorImage::new(size, pixels)
+}
+
 /// Means of squares of pixels, so many that no side is longer than `most` pixels.
-fn reduced(size: [usize; 2], rgba: &[u8], most: usize) -> ([usize; 2], Vec<u8>) {
+fn reduced(image: &ColorImage, most: usize) -> ColorImage {
+    let size = image.size;
     let factor = size[0].max(size[1]).div_ceil(most.max(1)).max(1);
     let small = size.map(|side| side.div_ceil(factor));
-    let mut bytes = vec![0; 4 * small[0] * small[1]];
-    bytes.par_chunks_exact_mut(4).enumerate().for_each(|(i, to)| {
+    let mean = |i: usize| {
         let [x0, y0] = [factor * (i % small[0]), factor * (i / small[0])];
-        let (mut sum, mut n) = ([0u32; 4], 0);
+        let (mut sum, mut n) = ([0u32; 3], 0);
         for y in y0..(y0 + factor).min(size[1]) {
             for x in x0..(x0 + factor).min(size[0]) {
-                let from = 4 * (y * size[0] + x);
-                sum.iter_mut().zip(&rgba[from..from + 4]).for_each(|(sum, &c)| *sum += u32::from(c));
+                let [r, g, b, _] = image.pixels[y * size[0] + x].to_array();
+                sum.iter_mut().zip([r, g, b]).for_each(|(sum, c)| *sum += u32::from(c));
                 n += 1;
             }
         }
-        to.iter_mut().zip(sum).for_each(|(to, sum)| *to = ((sum + n / 2) / n.max(1)) as u8);
-    });
-    (small, bytes)
+        let [r, g, b] = sum.map(|sum| ((sum + n / 2) / n.max(1)) as u8);
+        Color32::from_rgb(r, g, b)
+    };
+    ColorImage::new(small, (0..small[0] * small[1]).into_par_iter().map(mean).collect())
 }
 
 /// Nothing if no comparison is wanted that is painted here.

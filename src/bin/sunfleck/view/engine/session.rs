@@ -45,6 +45,8 @@ pub struct Frame {
     /// Median of the first radii and of those now, metres.
     pub first_radius: f32,
     pub radius: f32,
+    /// Mean of those now where something is gathered, metres; none if nothing is.
+    pub mean_radius: Option<f32>,
     /// Since the restart, pauses left out.
     pub seconds: f64,
 }
@@ -79,6 +81,12 @@ struct Shown {
     insides: bool,
 }
 
+/// None of nothing.
+fn mean(values: impl Iterator<Item = f32>) -> Option<f32> {
+    let (sum, n) = values.fold((0.0, 0u32), |(sum, n), value| (sum + f64::from(value), n + 1));
+    (n > 0).then(|| (sum / f64::from(n)) as f32)
+}
+
 /// See the module.
 pub struct Session {
     pub opened: Arc<Opened>,
@@ -95,6 +103,7 @@ pub struct Session {
     radii: Option<Arc<FirstRadii>>,
     split: Split,
     first_radius: f32,
+    mean_first_radius: Option<f32>,
     /// Done in this estimate.
     pub n_iterations: u32,
     pub seconds: f64,
@@ -133,6 +142,7 @@ impl Session {
             radii: None,
             split: Split::default(),
             first_radius: 0.0,
+            mean_first_radius: None,
             n_iterations: 0,
             seconds: 0.0,
             times: StageTimes::default(),
@@ -175,6 +185,7 @@ impl Session {
 
     fn set_radii(&mut self, radii: FirstRadii) {
         [_, self.first_radius, _] = radii.spread();
+        self.mean_first_radius = mean(radii.gathering());
         self.radii = Some(Arc::new(radii));
     }
 
@@ -190,7 +201,9 @@ impl Session {
             ppm::iterate(&mut *self.stages, &frame)?;
         }
         if let (0, FirstRadius::Fixed(_), Some(radii)) = (self.n_iterations, self.params.radius, &mut self.radii) {
-            Arc::make_mut(radii).look_at(&self.stages.eye_vertices()?);
+            let radii = Arc::make_mut(radii);
+            radii.look_at(&self.stages.eye_vertices()?);
+            self.mean_first_radius = mean(radii.gathering());
         }
         self.is_whole = true;
         self.times += self.stages.times()?;
@@ -234,6 +247,7 @@ impl Session {
 
     /// The film as it is.
     pub fn frame(&mut self) -> Result<Frame, Error> {
+        let scale = ppm::RadiusSchedule::new(self.params.alpha).scale(self.n_iterations.max(1));
         Ok(Frame {
             estimate: self.estimate,
             film: Arc::new(self.stages.film()?),
@@ -247,7 +261,8 @@ impl Session {
             first_radii: self.radii.clone().unwrap_or_default(),
             insides: None,
             first_radius: self.first_radius,
-            radius: self.first_radius * ppm::RadiusSchedule::new(self.params.alpha).scale(self.n_iterations.max(1)),
+            radius: self.first_radius * scale,
+            mean_radius: self.mean_first_radius.map(|radius| radius * scale),
             seconds: self.seconds,
         })
     }

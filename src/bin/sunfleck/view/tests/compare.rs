@@ -1,14 +1,16 @@
 //! The picture beside a reference.
 
-use std::sync::Arc;
+use std::any::Any;
+use std::sync::{Arc, Mutex, Weak};
 
 use eframe::egui;
-use egui::{Event, Key, Modifiers, PointerButton, Role};
+use egui::{ColorImage, Event, ImageData, Key, Modifiers, PointerButton, Role, TextureId};
+use egui_kittest::TestRenderer;
 use egui_kittest::kittest::{NodeT, Queryable};
 use sunfleck::output::Picture;
 use sunfleck::output::false_colour::NOT_FINITE;
 
-use super::Window;
+use super::{NoPixels, Window};
 use crate::view::engine::{Comparison, Painted, Reference, View};
 
 /// Compares the picture by FLIP with itself after `change`.
@@ -37,7 +39,7 @@ fn what_is_not_finite_is_left_out_and_told() {
 
     let painted = compared(&mut window, |picture| picture.rgb[5] = [1.0, f32::NAN, 1.0]);
     assert_eq!(painted.mean, Some(0.0));
-    assert!(painted.rgba[20..24] == NOT_FINITE && painted.value(5, 0)[0].is_nan() && painted.value(6, 0) == [0.0]);
+    assert!(painted.image.pixels[5].to_array() == NOT_FINITE && painted.value(5, 0)[0].is_nan() && painted.value(6, 0) == [0.0]);
     assert!(window.shows("Not finite") && window.shows("1 of 768"));
 
     let painted = compared(&mut window, |picture| picture.rgb.fill([f32::NAN; 3]));
@@ -110,4 +112,95 @@ fn what_is_shown_is_named() {
         window.steps(2);
         assert_eq!(shown(&window), ("Albedo".to_owned(), false));
     }
+}
+
+/// Shows the reference, which is there, beside the picture.
+fn wipe(window: &mut Window) {
+    window.viewer().wanted.painting.comparison = Comparison::Wipe;
+    window.wait("wipe", |viewer| {
+        viewer.picture.painted().is_some_and(|painted| painted.painting == viewer.wanted.painting)
+    });
+    window.steps(3);
+}
+
+/// Neither a scene that is left nor a reference that is cleared stays in memory.
+#[test]
+fn what_is_left_is_freed() {
+    fn of<T: Any + Send + Sync>(kept: &Arc<T>) -> Weak<dyn Any + Send + Sync> {
+        let weak: Weak<T> = Arc::downgrade(kept);
+        weak
+    }
+    let has_texture = |window: &Window| {
+        let textures = window.harness.ctx.tex_manager();
+        textures.read().allocated().any(|(_, texture)| texture.name == "reference")
+    };
+    for leave in [(|window| window.viewer().close_scene()) as fn(&mut Window), |window| window.viewer().open("glass")] {
+        let mut window = Window::with_picture();
+        let painted = compared(&mut window, |_| {});
+        wipe(&mut window);
+        assert!(has_texture(&window));
+        let reference = of(&painted.reference.as_ref().unwrap().0);
+        drop(painted);
+        window.activate("Clear");
+        window.wait("memory of the reference", |_| reference.strong_count() == 0);
+        window.step();
+        assert!(!has_texture(&window));
+
+        drop(compared(&mut window, |_| {}));
+        wipe(&mut window);
+        let painted = window.viewer().picture.painted().unwrap().clone();
+        let frame = &painted.frame;
+        let kept = [of(&painted), of(frame), of(&frame.film), of(&frame.scene), of(&frame.opened), of(&painted.image)];
+        drop(painted);
+        // A panel that is not drawn keeps nothing either.
+        window.viewer().remembered.show_inspect = false;
+        window.step();
+        leave(&mut window);
+        window.wait("memory of the scene", |_| kept.iter().all(|kept| kept.strong_count() == 0));
+        assert!(!has_texture(&window));
+    }
+}
+
+/// Notes the images of textures.
+#[derive(Clone, Default)]
+struct Textures(Arc<Mutex<Vec<(TextureId, Arc<ColorImage>)>>>);
+
+impl TestRenderer for Textures {
+    fn handle_delta(&mut self, delta: &mut egui::TexturesDelta) {
+        let set = delta.set.drain().flat_map(|(id, deltas)| deltas.into_iter().map(move |delta| (id, delta.image)));
+        self.0.lock().unwrap().extend(set.map(|(id, image)| match image {
+            ImageData::Color(image) => (id, image),
+        }));
+        delta.free.clear();
+    }
+
+    fn render(&mut self, context: &egui::Context, output: &egui::FullOutput) -> Result<image::RgbaImage, String> {
+        NoPixels.render(context, output)
+    }
+}
+
+/// At 4K a copy takes longer than a frame of the window may.
+#[test]
+fn pictures_become_textures_without_a_copy() {
+    let textures = Textures::default();
+    let mut window = Window::with_renderer(Some("cornell"), textures.clone());
+    window.wait_for_picture();
+    drop(compared(&mut window, |_| {}));
+    let id_of = |image: &Arc<ColorImage>| {
+        let textures = textures.0.lock().unwrap();
+        textures.iter().find(|(_, of)| Arc::ptr_eq(of, image)).map(|(id, _)| *id).expect("the image itself")
+    };
+    let mut ids = vec![];
+    for exposure in [0.0, 1.0] {
+        window.viewer().wanted.painting.comparison = Comparison::Wipe;
+        window.viewer().edit_at(0.0, "test", |settings| settings.exposure = Some(exposure));
+        window.wait("exposure", |viewer| {
+            viewer.picture.painted().is_some_and(|painted| painted.exposure == exposure && painted.difference().is_none())
+        });
+        window.steps(2);
+        let painted = window.viewer().picture.painted().unwrap().clone();
+        ids.push([painted.texture(), painted.reference_texture().unwrap()].map(id_of));
+    }
+    // Nor is a texture made anew.
+    assert_eq!(ids[0], ids[1]);
 }

@@ -339,10 +339,10 @@ fn every_view_and_comparison_is_painted() {
         painted(&mut window, "photons");
         assert!(window.shows(" photons stored"));
     }
-    let few = window.viewer().picture.painted().unwrap().rgba.clone();
+    let few = Arc::clone(&window.viewer().picture.painted().unwrap().image);
     window.activate("hidden too");
     painted(&mut window, "hidden photons");
-    assert!(few != window.viewer().picture.painted().unwrap().rgba);
+    assert!(few != window.viewer().picture.painted().unwrap().image);
     window.viewer().next_photons();
     window.activate("Pin");
     window.wait("reference", |viewer| viewer.now.reference.is_some());
@@ -375,7 +375,7 @@ fn where_nothing_is_gathered_no_radius_is_shown() {
             })
         });
         let painted = window.viewer().picture.painted().unwrap().clone();
-        let pixel = |x: usize, y: usize| &painted.rgba[4 * (32 * y + x)..][..4];
+        let pixel = |x: usize, y: usize| painted.image.pixels[32 * y + x].to_array();
         assert!(painted.value(0, 0) == [0.0] && pixel(0, 0) == NOTHING, "{radius}");
         assert!(painted.value(16, 12)[0] > 0.0 && pixel(16, 12) != NOTHING, "{radius}");
     }
