@@ -4,10 +4,14 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::cpu::gather::Estimate;
+use crate::device::{Error, Interrupt};
 use crate::index::PointBvh;
 use crate::index::stats::CountedPointBvh;
 use crate::layout::{EYE_GATHER, EyeVertex, Frame, Photon};
 use crate::scene::PackedScene;
+
+/// Pixels between two looks at an interrupt.
+const CHUNK: usize = 2048;
 
 /// What a backend's getters give after [`crate::ppm::Stages::gather`], on the CPU, whichever backend it was.
 pub struct Iteration<'a> {
@@ -58,8 +62,9 @@ impl<'a> Iteration<'a> {
     }
 
     /// Gathers again, each kind of photon by itself, on all threads; some two and a half times the work of the CPU's gather.
-    pub fn split(&self) -> Split {
-        Split { n_iterations: 1, pixels: self.each(|vertex, radius| self.parts(vertex, radius)) }
+    pub fn split(&self, interrupt: &Interrupt) -> Result<Split, Error> {
+        let pixels = self.each(interrupt, |vertex, radius| self.parts(vertex, radius))?;
+        Ok(Split { n_iterations: 1, pixels })
     }
 
     fn parts(&self, vertex: &EyeVertex, radius: f32) -> Parts {
@@ -90,17 +95,30 @@ impl<'a> Iteration<'a> {
 
     /// Nodes of the tree over the photons that each pixel's search enters, `[h·w]`; 0 where nothing is gathered.
     /// As much work as [`Iteration::split`].
-    pub fn nodes_visited(&self) -> Vec<u32> {
+    pub fn nodes_visited(&self, interrupt: &Interrupt) -> Result<Vec<u32>, Error> {
         let tree = CountedPointBvh::new(&self.tree);
-        self.each(|vertex, radius| {
+        self.each(interrupt, |vertex, radius| {
             let gathers = vertex.flags & EYE_GATHER != 0;
             if gathers { tree.visits(vertex.position.into(), radius).nodes as u32 } else { 0 }
         })
     }
 
-    fn each<T: Send>(&self, value: impl Fn(&EyeVertex, f32) -> T + Sync) -> Vec<T> {
-        let pixels = self.vertices.par_iter().zip(self.first_radii).with_min_len(256);
-        pixels.map(|(vertex, first_radius)| value(vertex, first_radius * self.frame.radius_scale)).collect()
+    fn each<T: Clone + Default + Send>(
+        &self,
+        interrupt: &Interrupt,
+        value: impl Fn(&EyeVertex, f32) -> T + Sync,
+    ) -> Result<Vec<T>, Error> {
+        let mut values = vec![T::default(); self.vertices.len()];
+        let pixels = self.vertices.par_chunks(CHUNK).zip(self.first_radii.par_chunks(CHUNK));
+        let done: Result<(), Error> = values.par_chunks_mut(CHUNK).zip(pixels).try_for_each(|(values, pixels)| {
+            let (vertices, first_radii) = pixels;
+            interrupt.check()?;
+            for ((to, vertex), first_radius) in values.iter_mut().zip(vertices).zip(first_radii) {
+                *to = value(vertex, first_radius * self.frame.radius_scale);
+            }
+            Ok(())
+        });
+        done.map(|()| values)
     }
 }
 

@@ -9,7 +9,7 @@ use sunfleck::index;
 use sunfleck::inspect::{self, ColorBy, FirstHits, Hit, Iteration, Object, Split, Style, View};
 use sunfleck::layout::{self, EYE_GATHER, EyeVertex, Frame, PRIMITIVE_SPHERE, Photon};
 use sunfleck::math::oct;
-use sunfleck::ppm::{self, Direct, FirstRadius, Params, Stages};
+use sunfleck::ppm::{self, Direct, Error, FirstRadius, Interrupt, Params, Stages};
 use sunfleck::scene::{Camera, Material, Mesh, PackedScene, Projection, PunctualKind, PunctualLight, Scene, Sphere};
 
 const SIZE: u32 = 32;
@@ -139,11 +139,14 @@ fn the_parts_of_the_light_add_up_to_it() {
             ppm::iterate(&mut stages, &frame).expect("iteration");
             let (vertices, photons) = (stages.eye_vertices().expect("eye"), stages.photons().expect("photons"));
             let iteration = Iteration::new(&packed, &frame, &vertices, &first_radii.each, &photons);
-            let split = iteration.split();
+            let split = iteration.split(&Interrupt::default()).expect("split");
             assert_sums(&split, &stages.radiance().expect("radiance"));
             let radii = iteration.radii();
             assert!(radii.iter().zip(&first_radii.each).all(|(r, first)| *r == first * frame.radius_scale));
-            let nodes = iteration.nodes_visited();
+            let nodes = iteration.nodes_visited(&Interrupt::default()).expect("nodes");
+            let unwanted = Interrupt::when(|| true);
+            assert!(matches!(iteration.split(&unwanted), Err(Error::Interrupted)));
+            assert!(matches!(iteration.nodes_visited(&unwanted), Err(Error::Interrupted)));
             for (pixel, parts) in split.pixels.iter().enumerate().step_by(7) {
                 let expected = brute_force(&frame, &vertices[pixel], radii[pixel], &photons);
                 assert_eq!(parts.gathered, expected as f32, "pixel {pixel}");

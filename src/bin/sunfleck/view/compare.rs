@@ -45,9 +45,9 @@ impl CompareView {
     /// The texture of `image`.
     fn take(&mut self, ctx: &egui::Context, image: &Arc<ColorImage>) -> egui::TextureId {
         let options = egui::TextureOptions { magnification: egui::TextureFilter::Nearest, ..Default::default() };
-        let (of, texture) = self.texture.get_or_insert_with(|| {
-            (Arc::downgrade(image), ctx.load_texture("reference", Arc::clone(image), options))
-        });
+        let (of, texture) = self
+            .texture
+            .get_or_insert_with(|| (Arc::downgrade(image), ctx.load_texture("reference", Arc::clone(image), options)));
         if of.as_ptr() != Arc::as_ptr(image) {
             texture.set(Arc::clone(image), options);
             *of = Arc::downgrade(image);

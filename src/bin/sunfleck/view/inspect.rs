@@ -129,19 +129,19 @@ fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
     });
     let Some(painted) = painted else { return };
     let view = Some(painted.painting.view).filter(|_| painted.difference().is_none());
-    let looks_inside = view.is_some_and(View::needs_photons);
-    if (looks_inside || painted.painting.photons.is_some()) && painted.frame.insides.is_none() {
+    if painted.lacks() {
         ui.weak("Waiting for an iteration's photons …");
     } else if view == Some(View::Variance) && painted.frame.film.n_iterations < 2 {
         ui.weak("One iteration has no variance yet.");
     }
-    if let (true, Some(insides)) = (looks_inside, &painted.frame.insides) {
-        let text = match (painted.painting.view, insides.split.n_iterations) {
-            (View::NodesVisited, _) => "Of the last iteration".to_owned(),
-            (_, 1) => "Of one iteration".to_owned(),
-            (_, n) => format!("Mean of {n} iterations"),
+    let needs = view.map(View::needs).filter(|needs| needs.is_any() && !painted.lacks());
+    if let (Some(needs), Some(insides)) = (needs, &painted.frame.insides) {
+        let text = match insides.split.as_ref().filter(|_| needs.split).map(|split| split.n_iterations) {
+            None => "Of the last iteration".to_owned(),
+            Some(1) => "Of one iteration".to_owned(),
+            Some(n) => format!("Mean of {n} iterations"),
         };
-        ui.weak(text).on_hover_text("Iterations are looked into while a view or photons that need it are on");
+        ui.weak(text).on_hover_text("Iterations are looked into while a view that needs it is on");
     }
     if let Some(legend) = &painted.legend {
         let unit = unit(painted);
@@ -269,12 +269,13 @@ fn cursor(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
     ui.separator();
     table(ui, "photons", |ui| {
         let insides = film.and_then(|(painted, i, ..)| Some((painted.frame.insides.as_ref()?, i)));
-        let gathered = insides.and_then(|(insides, i)| insides.split.pixels.get(i)).map(|parts| short(parts.gathered));
+        let gathered =
+            insides.and_then(|(insides, i)| insides.split.as_ref()?.pixels.get(i)).map(|parts| short(parts.gathered));
         row(
             ui,
             "Photons",
             gathered,
-            "Gathered by an iteration, on average; a view or photons that need them must be on",
+            "Gathered by an iteration, on average, while the view is of gathered photons or of a kind of light",
         );
         let radius = film.filter(|_| hit.is_some()).and_then(|(painted, i, ..)| {
             let FirstRadii { each, gathers } = &*painted.frame.first_radii;
@@ -286,8 +287,8 @@ fn cursor(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
         let error = variance.zip(radiance_of(film)).filter(|(_, y)| *y > 0.0).map(|(v, y)| v.sqrt() / y);
         let error = error.map(|e| format!("{} %", short(100.0 * e)));
         row(ui, "Relative error", error, "Standard deviation of the mean luminance over it");
-        let nodes = insides.and_then(|(insides, i)| insides.nodes_visited.get(i)).map(u32::to_string);
-        row(ui, "Nodes visited", nodes, "Of the tree, by this pixel's last search");
+        let nodes = insides.and_then(|(insides, i)| insides.nodes_visited.as_ref()?.get(i)).map(u32::to_string);
+        row(ui, "Nodes visited", nodes, "Of the tree, by this pixel's last search, while the view is of them");
     });
     ui.separator();
     selection(ui, viewer);

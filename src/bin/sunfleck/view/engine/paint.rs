@@ -90,9 +90,13 @@ impl View {
         }
     }
 
-    /// Whether it is made from an iteration's photons, read back.
-    pub fn needs_photons(self) -> bool {
-        matches!(self, Self::Direct | Self::Caustic | Self::Indirect | Self::PhotonCount | Self::NodesVisited)
+    /// What it is made from beside the film.
+    pub fn needs(self) -> Needs {
+        Needs {
+            split: matches!(self, Self::Direct | Self::Caustic | Self::Indirect | Self::PhotonCount),
+            nodes_visited: self == Self::NodesVisited,
+            photons: false,
+        }
     }
 }
 
@@ -108,12 +112,38 @@ pub enum Comparison {
     Flip,
 }
 
-/// Of an iteration, read back from the device.
+/// Of an iteration, read back from the device: as much as was needed.
 #[derive(Debug, Default)]
 pub struct Insides {
-    pub split: inspect::Split,
-    pub nodes_visited: Vec<u32>,
     pub photons: Vec<Photon>,
+    pub split: Option<inspect::Split>,
+    pub nodes_visited: Option<Vec<u32>>,
+}
+
+/// What of an iteration is needed. The photons alone are quick to have; the others gather again, on the processor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Needs {
+    pub photons: bool,
+    pub split: bool,
+    pub nodes_visited: bool,
+}
+
+impl Needs {
+    /// Whether all of it is `there`.
+    pub fn are_met_by(self, there: Self) -> bool {
+        (!self.photons || there.photons) && (!self.split || there.split) && (!self.nodes_visited || there.nodes_visited)
+    }
+
+    pub fn is_any(self) -> bool {
+        self != Self::default()
+    }
+}
+
+impl Insides {
+    /// What there is.
+    pub fn has(&self) -> Needs {
+        Needs { photons: true, split: self.split.is_some(), nodes_visited: self.nodes_visited.is_some() }
+    }
 }
 
 /// The numbers behind the colours.
@@ -145,9 +175,10 @@ pub struct Painting {
 }
 
 impl Painting {
-    /// Whether it is made from an iteration's photons, read back.
-    pub fn looks_inside(&self) -> bool {
-        self.view.needs_photons() || self.photons.is_some()
+    /// What it is made from beside the film; the view needs nothing where a difference `hides` it.
+    pub fn needs(&self, hides: bool) -> Needs {
+        let of_view = if hides { Needs::default() } else { self.view.needs() };
+        Needs { photons: self.photons.is_some(), ..of_view }
     }
 }
 
@@ -205,6 +236,11 @@ impl Painted {
         let is_painted = self.reference.is_some() && self.problem.is_none();
         let beside = matches!(self.painting.comparison, Comparison::Off | Comparison::Wipe);
         (is_painted && !beside).then_some(self.painting.comparison)
+    }
+
+    /// Whether something is shown without what an iteration has to give to it first.
+    pub fn lacks(&self) -> bool {
+        !self.painting.needs(self.difference().is_some()).are_met_by(self.frame.has())
     }
 
     pub fn reduce(&mut self, most_side: Option<usize>) {
@@ -371,8 +407,9 @@ impl Painter {
     }
 
     fn view(&mut self, frame: &Arc<Frame>, picture: Picture, painting: Painting, exposure: f32) -> Colours {
+        let split = frame.insides.as_ref().and_then(|insides| insides.split.as_ref());
         let part = |pick: fn(&inspect::Parts) -> [f32; 3]| {
-            frame.insides.as_ref().map(|insides| insides.split.pixels.iter().map(pick).collect::<Vec<_>>())
+            split.map(|split| split.pixels.iter().map(pick).collect::<Vec<_>>())
         };
         let as_picture = |rgb: Vec<[f32; 3]>| {
             let picture = Picture { rgb, size: frame.params.size, crop: frame.params.crop, variance: None };
@@ -406,13 +443,14 @@ impl Painter {
                 far(&mut colours);
                 colours
             }
-            View::PhotonCount | View::NodesVisited => {
-                let Some(insides) = &frame.insides else { return as_picture(picture.rgb) };
-                match painting.view {
-                    View::PhotonCount => scalar(insides.split.pixels.iter().map(|p| p.gathered).collect(), true),
-                    _ => scalar(insides.nodes_visited.iter().map(|&n| n as f32).collect(), false),
-                }
-            }
+            View::PhotonCount => match split {
+                Some(split) => scalar(split.pixels.iter().map(|p| p.gathered).collect(), true),
+                None => as_picture(picture.rgb),
+            },
+            View::NodesVisited => match frame.insides.as_ref().and_then(|insides| insides.nodes_visited.as_ref()) {
+                Some(nodes) => scalar(nodes.iter().map(|&n| n as f32).collect(), false),
+                None => as_picture(picture.rgb),
+            },
             View::Radius => {
                 let scale = frame.radius / frame.first_radius.max(f32::MIN_POSITIVE);
                 let radii = frame.first_radii.each.iter().zip(&frame.first_radii.gathers);

@@ -1,34 +1,38 @@
 //! The paint thread: it paints the newest film as it is wanted now.
 //!
-//! It has threads of its own, or a slow iteration would keep a change of exposure waiting.
+//! It has threads of its own, or a slow iteration would keep a change of exposure waiting. Of films that are but newer it
+//! paints no more than leaves the processor half of the time. What it painted is dropped here, too: memory of a large film
+//! takes longer to give back than a frame of the window may last.
 
-use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, PoisonError};
+use std::time::{Duration, Instant};
 
 use super::paint::{Painted, Painter, Painting, fitting};
-use super::{Board, Frame, Measured, Message, Reference, Shared, catch, is_same};
+use super::{Board, Frame, Measured, Message, Phase, Reference, Shared, catch, is_same};
+
+/// Between looks whether a picture is used by nobody any more.
+const LOOK_EVERY: Duration = Duration::from_millis(100);
 
 /// Until the interface is gone.
 pub fn run(shared: &Shared) {
     let n_threads = (rayon::current_num_threads() / 2).max(1);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build();
-    let mut painter = Painter::default();
-    // What could not be painted is not tried again.
-    let mut failed: Option<Task> = None;
-    loop {
-        let task = {
-            let board = shared.wait_until(|board| match &board.frame {
-                Some(frame) => !is_painted(board, frame) && failed.as_ref().is_none_or(|task| !task.is_of(board)),
-                None => !painter.is_empty() || failed.is_some(),
-            });
-            if board.quit {
-                break;
+    let mut state = State::default();
+    while let Some(next) = wait(shared, &mut state) {
+        let task = match next {
+            Next::Drop(left) => {
+                drop(left);
+                continue;
             }
-            Task::of(&board)
+            Next::Forget => {
+                (state.painter, state.failed) = (Painter::default(), None);
+                continue;
+            }
+            Next::Paint(task) => task,
         };
-        let Some(task) = task else {
-            (painter, failed) = (Painter::default(), None);
-            continue;
-        };
+        task.frame.is_taken.store(true, Ordering::Relaxed);
+        let (began, painter) = (Instant::now(), &mut state.painter);
         let mut work = || {
             let (estimated, figures) = painter.measure(&task.frame, task.reference.as_ref());
             let mut painted = painter.paint(&task.frame, task.reference.clone(), task.painting);
@@ -44,15 +48,77 @@ pub fn run(shared: &Shared) {
             Ok(pool) => pool.install(&mut work),
             Err(_) => work(), // Without a pool of its own it takes the common one.
         });
+        state.rested = Some(Instant::now() + began.elapsed());
         match done {
-            Ok((painted, estimated)) => shared.update(|board| publish(board, &task, painted, estimated)),
+            Ok((painted, estimated)) => {
+                state.painted.push(Arc::clone(&painted));
+                shared.update(|board| publish(board, &task, painted, estimated));
+            }
             Err(error) => {
-                painter = Painter::default();
+                state.painter = Painter::default();
                 shared.update(|board| board.messages.push(Message::Error(format!("cannot show the picture: {error}"))));
-                failed = Some(task);
+                state.failed = Some(task);
             }
         }
     }
+}
+
+#[derive(Default)]
+struct State {
+    painter: Painter,
+    /// What could not be painted is not tried again.
+    failed: Option<Task>,
+    /// All that somebody may still use, so that nobody else is the last to.
+    painted: Vec<Arc<Painted>>,
+    /// When it has rested as long as it worked last.
+    rested: Option<Instant>,
+}
+
+enum Next {
+    Paint(Task),
+    /// There is nothing to paint: what is kept is of a scene that was left.
+    Forget,
+    /// What nobody uses any more.
+    Drop(Vec<Arc<Painted>>),
+}
+
+impl State {
+    /// Or until when there is nothing to do, unless something changes.
+    fn next(&mut self, board: &Board) -> Result<Next, Option<Instant>> {
+        let now = Instant::now();
+        let left: Vec<_> = self.painted.extract_if(.., |painted| Arc::strong_count(painted) == 1).collect();
+        if !left.is_empty() {
+            return Ok(Next::Drop(left));
+        }
+        // The one that is shown has others that use it.
+        let look = (self.painted.len() > usize::from(board.painted.is_some())).then(|| now + LOOK_EVERY);
+        match Task::of(board) {
+            None if !self.painter.is_empty() || self.failed.is_some() => Ok(Next::Forget),
+            Some(task) if !task.is_painted(board) && self.failed.as_ref().is_none_or(|failed| !failed.is(&task)) => {
+                match self.rested.filter(|&rested| rested > now && task.is_but_newer(board)) {
+                    Some(rested) => Err(Some(look.map_or(rested, |look| look.min(rested)))),
+                    None => Ok(Next::Paint(task)),
+                }
+            }
+            _ => Err(look),
+        }
+    }
+}
+
+/// What to do next; nothing if the interface is gone.
+fn wait(shared: &Shared, state: &mut State) -> Option<Next> {
+    let mut board = shared.board();
+    while !board.quit {
+        board = match state.next(&board) {
+            Ok(next) => return Some(next),
+            Err(None) => shared.changed.wait(board).unwrap_or_else(PoisonError::into_inner),
+            Err(Some(until)) => {
+                let time = until.saturating_duration_since(Instant::now());
+                shared.changed.wait_timeout(board, time).unwrap_or_else(PoisonError::into_inner).0
+            }
+        };
+    }
+    None
 }
 
 /// What is to be painted.
@@ -73,10 +139,30 @@ impl Task {
         })
     }
 
-    fn is_of(&self, board: &Board) -> bool {
-        board.frame.as_ref().is_some_and(|frame| Arc::ptr_eq(frame, &self.frame))
-            && self.painting == board.wanted.painting
-            && is_same(self.reference.as_ref(), board.reference.as_ref())
+    fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.frame, &other.frame)
+            && self.painting == other.painting
+            && is_same(self.reference.as_ref(), other.reference.as_ref())
+    }
+
+    /// Whether `painted` is of something like it: as it is wanted, beside the reference that is wanted.
+    fn is_like(&self, painted: &Painted) -> bool {
+        let reference = painted.reference.as_ref().map(|(reference, _)| reference);
+        painted.painting == self.painting && is_same(reference, fitting(self.reference.as_ref(), &self.frame))
+    }
+
+    fn is_painted(&self, board: &Board) -> bool {
+        let is_it = |painted: &Arc<Painted>| Arc::ptr_eq(&painted.frame, &self.frame) && self.is_like(painted);
+        board.painted.as_ref().is_some_and(is_it)
+    }
+
+    /// Whether it has nothing that is waited for: the film of more iterations of what is shown, and not the last.
+    fn is_but_newer(&self, board: &Board) -> bool {
+        let is_older = |painted: &Arc<Painted>| {
+            let (before, now) = (&painted.frame, &self.frame);
+            before.estimate == now.estimate && before.has() == now.has() && self.is_like(painted)
+        };
+        board.phase == Phase::Rendering && board.painted.as_ref().is_some_and(is_older)
     }
 }
 
@@ -101,10 +187,124 @@ fn publish(board: &mut Board, task: &Task, painted: Arc<Painted>, estimated: Opt
     }
 }
 
-fn is_painted(board: &Board, frame: &Arc<Frame>) -> bool {
-    board.painted.as_ref().is_some_and(|painted| {
-        Arc::ptr_eq(&painted.frame, frame)
-            && painted.painting == board.wanted.painting
-            && is_same(painted.reference.as_ref().map(|r| &r.0), fitting(board.reference.as_ref(), frame))
-    })
+#[cfg(test)]
+mod tests {
+    use sunfleck::output::difference::Measure;
+    use sunfleck::ppm::Interrupt;
+
+    use super::super::paint::{Comparison, Needs, View};
+    use super::super::session::tests::session;
+    use super::*;
+
+    /// Of the first iterations, and the first of them painted.
+    fn frames() -> ([Arc<Frame>; 3], Arc<Painted>) {
+        let mut session = session(Interrupt::default());
+        let frames = std::array::from_fn(|_| {
+            session.iterate().unwrap();
+            Arc::new(session.frame().unwrap())
+        });
+        let painted = Painter::default().paint(&frames[0], None, Painting::default());
+        (frames, Arc::new(painted))
+    }
+
+    fn board(frame: &Arc<Frame>, painted: &Arc<Painted>) -> Board {
+        Board {
+            frame: Some(Arc::clone(frame)),
+            painted: Some(Arc::clone(painted)),
+            phase: Phase::Rendering,
+            ..Board::default()
+        }
+    }
+
+    #[test]
+    fn a_newer_film_waits_and_what_is_asked_for_does_not() {
+        let ([first, second, third], painted) = frames();
+        let mut state = State { rested: Some(Instant::now() + Duration::from_secs(3600)), ..State::default() };
+        let mut paints = |board: &Board| matches!(state.next(board), Ok(Next::Paint(_)));
+        assert!(!paints(&board(&first, &painted)));
+        assert!(!paints(&board(&second, &painted)));
+        let mut asked = board(&second, &painted);
+        asked.wanted.painting.look.exposure = Some(1.0);
+        assert!(paints(&asked));
+        asked = board(&second, &painted);
+        asked.reference = Some(Arc::new(Reference { name: String::new(), picture: first.picture() }));
+        assert!(paints(&asked));
+        asked = board(&second, &painted);
+        asked.phase = Phase::Paused;
+        assert!(paints(&asked));
+        let restarted = Frame { estimate: 2, ..Frame::clone(&third) };
+        assert!(paints(&board(&Arc::new(restarted), &painted)));
+        let looked_into = Frame { insides: Some(Arc::default()), ..Frame::clone(&third) };
+        assert!(paints(&board(&Arc::new(looked_into), &painted)));
+        state.rested = Some(Instant::now());
+        assert!(matches!(state.next(&board(&second, &painted)), Ok(Next::Paint(_))));
+    }
+
+    #[test]
+    fn what_was_painted_is_dropped_by_who_painted_it() {
+        let ([first, second, _], shown) = frames();
+        let mut state = State { painted: vec![Arc::clone(&shown)], ..State::default() };
+        let mut board = board(&first, &shown);
+        assert!(matches!(state.next(&board), Err(None)));
+        // The window still shows it, and does not say when it no longer does.
+        let newer = Arc::new(Painter::default().paint(&second, None, Painting::default()));
+        (board.frame, board.painted) = (Some(second), Some(Arc::clone(&newer)));
+        state.painted.push(newer);
+        assert!(matches!(state.next(&board), Err(Some(_))));
+        drop(shown);
+        assert!(matches!(state.next(&board), Ok(Next::Drop(left)) if left.len() == 1));
+        assert!(matches!(state.next(&board), Err(None)));
+        // Of a scene that is left, too.
+        (board.frame, board.painted) = (None, None);
+        assert!(matches!(state.next(&board), Ok(Next::Drop(left)) if left.len() == 1));
+        assert!(matches!(state.next(&board), Err(None)));
+    }
+
+    #[test]
+    fn a_reference_is_made_again_only_to_be_shown_otherwise() {
+        let ([first, second, _], _) = frames();
+        let reference = Arc::new(Reference { name: String::new(), picture: first.picture() });
+        let mut painter = Painter::default();
+        let mut painting = Painting::default();
+        painting.look.exposure = Some(0.0);
+        let mut image_of = |frame, painting| {
+            let painted = painter.paint(frame, Some(Arc::clone(&reference)), painting);
+            painted.reference.unwrap().1
+        };
+        let image = image_of(&first, painting);
+        let wiped = Painting { comparison: Comparison::Wipe, view: View::Albedo, ..painting };
+        assert!(Arc::ptr_eq(&image, &image_of(&second, wiped)));
+        let stops = image_of(&second, Painting { view: View::Stops, ..painting });
+        assert!(image.pixels != stops.pixels);
+        painting.look.exposure = Some(1.0);
+        let brighter = image_of(&second, painting);
+        assert!(image.pixels != brighter.pixels);
+        // As if made for the first time.
+        let painted = Painter::default().paint(&second, Some(Arc::clone(&reference)), painting);
+        assert!(painted.reference.unwrap().1 == brighter);
+    }
+
+    #[test]
+    fn a_view_behind_a_difference_needs_nothing() {
+        let ([first, second, _], painted) = frames();
+        let reference = Arc::new(Reference { name: String::new(), picture: first.picture() });
+        let mut board = board(&second, &painted);
+        let painting = Painting {
+            view: View::Caustic,
+            comparison: Comparison::Difference(Measure::Absolute),
+            ..Painting::default()
+        };
+        board.wanted.painting = painting;
+        let split = Needs { split: true, ..Needs::default() };
+        assert_eq!(board.needs(), split);
+        let difference = Arc::new(Painter::default().paint(&second, Some(reference), painting));
+        assert!(!difference.lacks());
+        board.painted = Some(difference);
+        assert_eq!(board.needs(), Needs::default());
+        board.wanted.painting.comparison = Comparison::Wipe;
+        assert_eq!(board.needs(), split);
+        // One that cannot be shown, as no reference is there, hides nothing.
+        let view = Painter::default().paint(&second, None, painting);
+        assert!(view.lacks());
+    }
 }

@@ -1,6 +1,7 @@
 //! One scene on one device: an estimate under way.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
@@ -11,7 +12,8 @@ use sunfleck::ppm::{self, Error, Film, FirstRadii, FirstRadius, Interrupt, Param
 use sunfleck::scene::PackedScene;
 use sunfleck::scene::settings::Settings;
 
-use super::{Insides, Opened, Record, Wanted};
+use super::paint::Needs;
+use super::{Board, Insides, Opened, Painted, Record, Wanted};
 use crate::devices::Device;
 use crate::job::Input;
 
@@ -21,6 +23,8 @@ const PREVIEW: u32 = 4;
 const PREVIEW_PATHS: u32 = 20_000;
 /// Between films that are read back.
 const SHOW_EVERY: Duration = Duration::from_millis(80);
+/// The same, in times of what reading the last one back took.
+const SHOW_EVERY_TIMES: u32 = 10;
 /// Iterations that are shown at once.
 const SHOW_FIRST: u32 = 3;
 
@@ -49,6 +53,8 @@ pub struct Frame {
     pub mean_radius: Option<f32>,
     /// Since the restart, pauses left out.
     pub seconds: f64,
+    /// Whether the paint thread has begun with it.
+    pub is_taken: Arc<AtomicBool>,
 }
 
 /// What renders.
@@ -68,6 +74,11 @@ impl Frame {
         Picture { size: self.params.size, crop: self.params.crop, rgb: self.film.rgb(), variance: None }
     }
 
+    /// What was read back beside the film.
+    pub fn has(&self) -> Needs {
+        self.insides.as_ref().map_or(Needs::default(), |insides| insides.has())
+    }
+
     /// The camera as a pinhole, and the film behind it.
     pub fn view(&self) -> inspect::View {
         inspect::View::new(self.camera, self.params.size, self.params.crop)
@@ -77,8 +88,31 @@ impl Frame {
 /// What was shown last.
 struct Shown {
     when: Instant,
+    /// For the film, and for the insides.
+    took: [Duration; 2],
+    is_taken: Arc<AtomicBool>,
     n_iterations: u32,
-    insides: bool,
+    /// Beside the film.
+    has: Needs,
+}
+
+impl Shown {
+    /// Whether it is time for the next. Before the paint thread has begun with this one, the next would only take its place.
+    fn is_over(&self) -> bool {
+        let [film, insides] = self.took;
+        self.is_taken.load(Ordering::Relaxed)
+            && self.when.elapsed() >= SHOW_EVERY.max(SHOW_EVERY_TIMES * film).max(insides)
+    }
+}
+
+impl Board {
+    /// What of an iteration is needed for what is wanted now.
+    pub fn needs(&self) -> Needs {
+        let painting = &self.wanted.painting;
+        // Whether a difference can be shown, only its painting tells.
+        let difference = self.painted.as_deref().and_then(Painted::difference);
+        painting.needs(difference == Some(painting.comparison))
+    }
 }
 
 /// None of nothing.
@@ -220,28 +254,31 @@ impl Session {
     }
 
     /// Whether something wanted is not in what was shown last.
-    pub fn owes(&self, look_inside: bool) -> bool {
-        self.n_iterations > 0
-            && self
-                .shown
-                .as_ref()
-                .is_none_or(|s| s.n_iterations < self.n_iterations || look_inside && self.is_whole && !s.insides)
+    pub fn owes(&self, needs: Needs) -> bool {
+        let owes = |s: &Shown| s.n_iterations < self.n_iterations || self.is_whole && !needs.are_met_by(s.has);
+        self.n_iterations > 0 && self.shown.as_ref().is_none_or(owes)
     }
 
-    /// The film, if it is time to show it, or if there will be no more; with its insides, if `look_inside`.
-    pub fn frame_if_due(&mut self, is_last: bool, look_inside: bool) -> Result<Option<Frame>, Error> {
-        let is_due = is_last
-            || self.n_iterations <= SHOW_FIRST
-            || self.shown.as_ref().is_none_or(|shown| shown.when.elapsed() >= SHOW_EVERY);
-        if !is_due || !self.owes(look_inside) {
+    /// The film, if it is time to show it, or if there will be no more; with as much of the iteration as `needs` says.
+    pub fn frame_if_due(&mut self, is_last: bool, needs: Needs) -> Result<Option<Frame>, Error> {
+        let is_awaited = |s: &Shown| !needs.are_met_by(s.has) || s.is_over();
+        let is_due = is_last || self.n_iterations <= SHOW_FIRST || self.shown.as_ref().is_none_or(is_awaited);
+        if !is_due || !self.owes(needs) {
             return Ok(None);
         }
+        let began = Instant::now();
         let mut frame = self.frame()?;
-        let look_inside = look_inside && self.is_whole;
-        if look_inside {
-            frame.insides = Some(Arc::new(self.insides()?));
+        let film = began.elapsed();
+        if needs.is_any() && self.is_whole {
+            frame.insides = Some(Arc::new(self.insides(needs)?));
         }
-        self.shown = Some(Shown { when: Instant::now(), n_iterations: self.n_iterations, insides: look_inside });
+        self.shown = Some(Shown {
+            when: Instant::now(),
+            took: [film, began.elapsed() - film],
+            is_taken: Arc::clone(&frame.is_taken),
+            n_iterations: self.n_iterations,
+            has: frame.has(),
+        });
         Ok(Some(frame))
     }
 
@@ -264,18 +301,26 @@ impl Session {
             radius: self.first_radius * scale,
             mean_radius: self.mean_first_radius.map(|radius| radius * scale),
             seconds: self.seconds,
+            is_taken: Arc::default(),
         })
     }
 
     /// Of the last iteration; its light is added to the mean of those looked into before.
-    fn insides(&mut self) -> Result<Insides, Error> {
-        let frame = self.params.frame(self.n_iterations);
-        let (vertices, photons) = (self.stages.eye_vertices()?, self.stages.photons()?);
+    fn insides(&mut self, needs: Needs) -> Result<Insides, Error> {
+        let photons = self.stages.photons()?;
+        if !(needs.split || needs.nodes_visited) {
+            return Ok(Insides { photons, ..Insides::default() });
+        }
+        let (frame, vertices) = (self.params.frame(self.n_iterations), self.stages.eye_vertices()?);
         let radii = self.radii.as_deref().map_or(&[][..], |radii| &radii.each);
         let iteration = inspect::Iteration::new(&self.scene, &frame, &vertices, radii, &photons);
-        self.split.add(&iteration.split());
-        let nodes_visited = iteration.nodes_visited();
-        Ok(Insides { split: self.split.clone(), nodes_visited, photons })
+        let interrupt = self.stages.interrupt();
+        let nodes_visited = needs.nodes_visited.then(|| iteration.nodes_visited(interrupt)).transpose()?;
+        let split = needs.split.then(|| iteration.split(interrupt)).transpose()?.map(|split| {
+            self.split.add(&split);
+            self.split.clone()
+        });
+        Ok(Insides { photons, split, nodes_visited })
     }
 
     /// Whether a limit is reached.
@@ -285,5 +330,86 @@ impl Session {
             && (limits.iterations.is_some_and(|n| self.n_iterations >= n)
                 || limits.seconds.is_some_and(|s| self.seconds >= s)
                 || limits.noise.zip(noise).is_some_and(|(limit, noise)| noise <= limit))
+    }
+}
+
+#[cfg(test)]
+pub mod tests {
+    use sunfleck::scene::Accelerator;
+
+    use super::super::{Choice, reading};
+    use super::*;
+    use crate::cli::InputArgs;
+    use crate::job;
+
+    const NOTHING: Needs = Needs { photons: false, split: false, nodes_visited: false };
+    const PHOTONS: Needs = Needs { photons: true, ..NOTHING };
+    const SPLIT: Needs = Needs { split: true, ..NOTHING };
+    const NODES: Needs = Needs { nodes_visited: true, ..NOTHING };
+
+    /// A small one, of estimate 1, on the processor.
+    pub fn session(interrupt: Interrupt) -> Session {
+        let set = ["size=32x24", "photons=500"].map(str::to_owned).to_vec();
+        let opened = reading::open(&Arc::new(Choice { name: "cornell".to_owned(), set })).unwrap();
+        let settings = opened.source.settings.clone();
+        let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default()).unwrap();
+        let device = Device::Cpu(Accelerator::Bvh);
+        let mut session = Session::new(&device, opened.into(), settings.into(), input, None, interrupt).unwrap();
+        session.restart(1, false).unwrap();
+        session.start().unwrap();
+        session
+    }
+
+    #[test]
+    fn a_film_is_read_back_when_the_last_is_taken_and_that_leaves_time_to_render() {
+        let mut session = session(Interrupt::default());
+        let mut frame = None;
+        for _ in 0..SHOW_FIRST {
+            session.iterate().unwrap();
+            frame = session.frame_if_due(false, NOTHING).unwrap();
+            assert!(frame.is_some());
+        }
+        session.iterate().unwrap();
+        let long_ago = |session: &mut Session, film: u64, insides: u64| {
+            let shown = session.shown.as_mut().unwrap();
+            shown.when = Instant::now() - Duration::from_secs(1);
+            shown.took = [film, insides].map(Duration::from_millis);
+        };
+        long_ago(&mut session, 1, 0);
+        assert!(session.frame_if_due(false, NOTHING).unwrap().is_none());
+        frame.unwrap().is_taken.store(true, Ordering::Relaxed);
+        for (film, insides) in [(200, 0), (1, 100_000)] {
+            long_ago(&mut session, film, insides);
+            assert!(session.frame_if_due(false, NOTHING).unwrap().is_none());
+        }
+        long_ago(&mut session, 50, 500);
+        assert!(session.frame_if_due(false, NOTHING).unwrap().is_some());
+        // What was asked for since is shown at once, and the last in any case.
+        session.iterate().unwrap();
+        assert!(session.frame_if_due(false, NOTHING).unwrap().is_none());
+        assert!(session.frame_if_due(false, PHOTONS).unwrap().is_some());
+        session.iterate().unwrap();
+        assert!(session.frame_if_due(false, PHOTONS).unwrap().is_none());
+        assert!(session.frame_if_due(true, PHOTONS).unwrap().is_some());
+    }
+
+    #[test]
+    fn no_more_is_read_back_than_is_needed() {
+        let is_unwanted = Arc::new(AtomicBool::new(false));
+        let asked = Arc::clone(&is_unwanted);
+        let mut session = session(Interrupt::when(move || asked.load(Ordering::Relaxed)));
+        session.iterate().unwrap();
+        for needs in [NOTHING, PHOTONS, SPLIT, NODES] {
+            assert!(session.owes(needs), "{needs:?}");
+            let has = session.frame_if_due(true, needs).unwrap().unwrap().has();
+            assert_eq!(has, Needs { photons: needs.is_any(), ..needs });
+            assert!(!session.owes(needs) && !session.owes(NOTHING), "{needs:?}");
+        }
+        assert_eq!(session.split.n_iterations, 1);
+        // What gathers again can be left.
+        is_unwanted.store(true, Ordering::Relaxed);
+        assert!(matches!(session.frame_if_due(true, SPLIT), Err(Error::Interrupted)));
+        assert!(session.frame_if_due(true, PHOTONS).unwrap().is_none());
+        assert_eq!(session.split.n_iterations, 1);
     }
 }

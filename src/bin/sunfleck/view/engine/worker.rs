@@ -55,7 +55,7 @@ pub fn run(shared: &Arc<Shared>, mut device: Device) {
             let board = shared.wait_until(|board| {
                 have.is_behind(&board.wanted)
                     || have.can_go_on(&board.wanted, board.noise())
-                    || have.should_show(&board.wanted)
+                    || have.should_show(board)
                     || have.should_say(board)
             });
             if board.quit {
@@ -97,8 +97,8 @@ impl Have {
     }
 
     /// Whether there is nothing to do but to show what there is.
-    fn should_show(&self, wanted: &Wanted) -> bool {
-        self.session.as_ref().is_some_and(|session| session.owes(wanted.painting.looks_inside()))
+    fn should_show(&self, board: &Board) -> bool {
+        self.session.as_ref().is_some_and(|session| session.owes(board.needs()))
     }
 
     /// Whether it rests without having said so: a limit was reached, or a pause asked for, after the last film was shown.
@@ -245,7 +245,19 @@ impl Have {
     /// Publishes the film now and then; at once if it `is_last` for a while.
     fn show(&mut self, shared: &Shared, wanted: &Wanted, is_last: bool) -> Result<()> {
         let Some(session) = &mut self.session else { return Ok(()) };
-        let frame = session.frame_if_due(is_last, wanted.painting.looks_inside())?;
+        let work = Work {
+            wanted: wanted.clone(),
+            opened: Arc::clone(&session.opened),
+            keep_on: wanted.moving && session.n_iterations == 1,
+        };
+        shared.redirect(|board| board.work = Some(work));
+        let needs = shared.board().needs();
+        let frame = session.frame_if_due(is_last, needs);
+        shared.redirect(|board| board.work = None);
+        let frame = match frame {
+            Err(Error::Interrupted) => return Ok(()),
+            frame => frame?,
+        };
         if let Some(frame) = frame {
             shared.update(|board| board.frame = Some(Arc::new(frame)));
         }

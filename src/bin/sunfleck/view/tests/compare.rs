@@ -39,7 +39,11 @@ fn what_is_not_finite_is_left_out_and_told() {
 
     let painted = compared(&mut window, |picture| picture.rgb[5] = [1.0, f32::NAN, 1.0]);
     assert_eq!(painted.mean, Some(0.0));
-    assert!(painted.image.pixels[5].to_array() == NOT_FINITE && painted.value(5, 0)[0].is_nan() && painted.value(6, 0) == [0.0]);
+    assert!(
+        painted.image.pixels[5].to_array() == NOT_FINITE
+            && painted.value(5, 0)[0].is_nan()
+            && painted.value(6, 0) == [0.0]
+    );
     assert!(window.shows("Not finite") && window.shows("1 of 768"));
 
     let painted = compared(&mut window, |picture| picture.rgb.fill([f32::NAN; 3]));
@@ -161,9 +165,11 @@ fn what_is_left_is_freed() {
     }
 }
 
+type Images = Vec<(TextureId, Arc<ColorImage>)>;
+
 /// Notes the images of textures.
 #[derive(Clone, Default)]
-struct Textures(Arc<Mutex<Vec<(TextureId, Arc<ColorImage>)>>>);
+struct Textures(Arc<Mutex<Images>>);
 
 impl TestRenderer for Textures {
     fn handle_delta(&mut self, delta: &mut egui::TexturesDelta) {
@@ -195,7 +201,10 @@ fn pictures_become_textures_without_a_copy() {
         window.viewer().wanted.painting.comparison = Comparison::Wipe;
         window.viewer().edit_at(0.0, "test", |settings| settings.exposure = Some(exposure));
         window.wait("exposure", |viewer| {
-            viewer.picture.painted().is_some_and(|painted| painted.exposure == exposure && painted.difference().is_none())
+            viewer
+                .picture
+                .painted()
+                .is_some_and(|painted| painted.exposure == exposure && painted.difference().is_none())
         });
         window.steps(2);
         let painted = window.viewer().picture.painted().unwrap().clone();

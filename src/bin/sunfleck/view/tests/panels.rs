@@ -320,10 +320,10 @@ fn every_view_and_comparison_is_painted() {
     let mut window = Window::with_picture();
     let painted = |window: &mut Window, what: &str| {
         window.wait(what, |viewer| {
-            viewer.picture.painted().is_some_and(|painted| {
-                let waits = painted.painting.looks_inside() && painted.frame.insides.is_none();
-                painted.painting == viewer.wanted.painting && !waits
-            })
+            viewer
+                .picture
+                .painted()
+                .is_some_and(|painted| painted.painting == viewer.wanted.painting && !painted.lacks())
         });
         window.steps(2);
         let problem = window.viewer().picture.painted().and_then(|painted| painted.problem.clone());
