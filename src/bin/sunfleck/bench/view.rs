@@ -2,8 +2,11 @@
 //!
 //! A real window is opened, on the display there is, and closed again. It draws as often as the display lets it; the
 //! figures are of all its frames, first while the camera rests, then while the pointer turns it for 0.3 s in every 1.2 s.
-//! What a frame costs the interface thread leaves out where it waits for the display; the time from one frame to the
-//! next has all. Without a display the same is drawn into a texture, at the pace of one of 60 Hz.
+//! Without a display the same is drawn into a texture, at the pace of one of 60 Hz.
+//!
+//! Whether the window is smooth is judged by the time from one frame to the next, which has all. What a frame costs the
+//! interface thread is what eframe measures: it leaves out where that waits for an image of the display, for the queue
+//! and for presenting, and so does not tell when the renderer starves the window there.
 
 use std::time::Duration;
 
@@ -13,12 +16,14 @@ use serde_json::json;
 
 use super::report::{self, Machine, Report, Row};
 use super::{Common, Where, backends};
+use crate::cli::values::{number, size};
 use crate::devices;
 use crate::view::measure::{self, Figures, Frames, Plan};
 use crate::view::timing::percentile;
 
 const NOTES: &[&str] = &[
-    "interval: from one frame of the window to the next; work: of the interface thread, waits for the display left out",
+    "interval: from one frame of the window to the next, all waits included: what tells whether the window is smooth",
+    "work: of the interface thread, without getting an image of the display, submitting and presenting, where it may be blocked",
     "wait: from an input to the first frame that shows a picture of it, a preview or a whole one",
 ];
 
@@ -39,6 +44,14 @@ pub struct ViewBenchArgs {
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     seconds: Option<f64>,
 
+    /// Size of the window, pixels; that of the picture is changed by `--set size=WxH`
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "1280x720")]
+    window: [u32; 2],
+
+    /// Pixels a point: how large the interface is drawn [default: the display's, without one 1]
+    #[arg(long, value_name = "FACTOR", value_parser = scale)]
+    scale: Option<f32>,
+
     /// Draw into a texture at 60 Hz: for a machine without a display
     #[arg(long)]
     offscreen: bool,
@@ -55,13 +68,27 @@ fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
+fn scale(text: &str) -> Result<f32, String> {
+    match number(text)? {
+        s if (0.5..=4.0).contains(&s) => Ok(s),
+        _ => Err("must be from 0.5 to 4".into()),
+    }
+}
+
 pub fn run(args: &ViewBenchArgs) -> Result<()> {
     let common = &args.common;
     common.prepare("view", &[])?;
     let backends = backends::names(&args.place.backend);
     let seconds = args.seconds.unwrap_or(if common.quick { 3.0 } else { 20.0 });
     let set = [vec![format!("seed={}", common.seed)], args.set.clone()].concat();
-    let plan = Plan { scene: args.scene.clone(), set, seconds, offscreen: args.offscreen };
+    let plan = Plan {
+        scene: args.scene.clone(),
+        set,
+        seconds,
+        size: args.window,
+        scale: args.scale,
+        offscreen: args.offscreen,
+    };
     let mut steps = common.steps(backends.len());
     let mut found = Vec::new();
     for backend in &backends {
@@ -72,7 +99,8 @@ pub fn run(args: &ViewBenchArgs) -> Result<()> {
         name: "view",
         machine: Machine::here(found.iter().map(|(_, figures)| figures.renderer.clone()).collect()),
         settings: json!({
-            "quick": common.quick, "scene": plan.scene, "set": plan.set, "seconds": seconds, "offscreen": plan.offscreen, "backends": backends,
+            "quick": common.quick, "scene": plan.scene, "set": plan.set, "seconds": seconds, "window": plan.size,
+            "scale": plan.scale, "offscreen": plan.offscreen, "backends": backends,
         }),
         notes: NOTES,
         rows: found.iter().flat_map(|(backend, figures)| rows(backend, figures)).collect(),
@@ -102,6 +130,7 @@ fn rows(backend: &str, figures: &Figures) -> Vec<Row> {
             .with("backend", backend)
             .with("renderer", figures.renderer.as_str())
             .with("window", figures.window.as_str())
+            .with("windowSize", figures.size.map(|side| side.to_string()).join("x"))
             .with("camera", part)
             .with("frames", frames.intervals.len())
             .with("iterations", frames.iterations);
@@ -130,10 +159,15 @@ fn print(machine: &Machine, plan: &Plan, found: &[(&str, Figures)]) {
         })
     });
     let table = report::table(&header, 2, lines);
-    let drawn = found.first().map_or("", |(_, figures)| figures.window.as_str());
+    let drawn = found.first().map(|(_, figures)| {
+        let [width, height] = figures.size;
+        format!("{width}×{height} pixels drawn by {}", figures.window)
+    });
     crate::print(&format!(
-        "{}\nThe window, drawn by {drawn}, while {} renders; milliseconds: median / 95 % within / most\n{table}",
+        "{}\nThe window, {}, while {} renders; milliseconds: median / 95 % within / most\n{table}\
+         The window is as smooth as “frame to frame” says; “interface thread” leaves out where that waits for the display.",
         machine.line(),
+        drawn.unwrap_or_default(),
         plan.scene
     ));
 }

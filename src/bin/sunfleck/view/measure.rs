@@ -15,6 +15,8 @@ use crate::devices::Device;
 const SPEED: f32 = 4.0;
 const MOVES: f64 = 0.3;
 const RESTS: f64 = 0.9;
+/// Frames in which the window takes its size.
+const SETTLES: u32 = 10;
 /// For the first picture.
 const PATIENCE: Duration = Duration::from_secs(600);
 
@@ -26,6 +28,10 @@ pub struct Plan {
     pub set: Vec<String>,
     /// Of each part, seconds.
     pub seconds: f64,
+    /// Of the window, pixels.
+    pub size: [u32; 2],
+    /// Pixels a point; the display's if none.
+    pub scale: Option<f32>,
     /// Into a texture, where there is no display.
     pub offscreen: bool,
 }
@@ -33,9 +39,10 @@ pub struct Plan {
 /// Frames of one part, in their order.
 #[derive(Clone, Debug, Default)]
 pub struct Frames {
-    /// From one to the next, waiting for the display included.
+    /// From one to the next: with all that the interface thread waits for.
     pub intervals: Vec<Duration>,
-    /// Of the interface thread, without the waiting.
+    /// Of the interface thread, without getting the next image of the display, submitting to its queue, and presenting: where
+    /// it waits for the display, and for the device.
     pub work: Vec<Duration>,
     /// Iterations that came to their end meanwhile.
     pub iterations: u32,
@@ -47,6 +54,8 @@ pub struct Figures {
     /// What rendered, and what drew the window.
     pub renderer: String,
     pub window: String,
+    /// Of the window as it was opened, pixels.
+    pub size: [u32; 2],
     /// The camera rests.
     pub resting: Frames,
     /// It is turned by the pointer, again and again.
@@ -71,9 +80,9 @@ pub fn run(device: Device, plan: &Plan) -> Result<Figures> {
     let bell = Bell::default();
     let engine = Engine::start(device, bell.wake())?;
     let mut viewer = Viewer::new(engine, bell.wake(), first);
-    let mut observer = Observer::new(plan.seconds);
+    let mut observer = Observer::new(plan);
     match plan.offscreen {
-        true => super::offscreen::run(&mut viewer, &bell, &mut observer)?,
+        true => super::offscreen::run(&mut viewer, &bell, &mut observer, plan.size)?,
         false => window::run(&mut viewer, &bell, options, &mut observer)?,
     }
     if let Some(error) = observer.error {
@@ -94,8 +103,9 @@ enum Part {
     Done,
 }
 
-struct Observer {
-    seconds: f64,
+struct Observer<'a> {
+    plan: &'a Plan,
+    n_frames: u32,
     part: Part,
     /// Of the part.
     began: Instant,
@@ -107,10 +117,11 @@ struct Observer {
     error: Option<String>,
 }
 
-impl Observer {
-    fn new(seconds: f64) -> Self {
+impl<'a> Observer<'a> {
+    fn new(plan: &'a Plan) -> Self {
         Self {
-            seconds,
+            plan,
+            n_frames: 0,
             part: Part::Opening,
             began: Instant::now(),
             last: None,
@@ -127,7 +138,22 @@ impl Observer {
 
     /// Opening has no end of its own.
     fn is_over(&self) -> bool {
-        self.began.elapsed().as_secs_f64() >= self.seconds
+        self.began.elapsed().as_secs_f64() >= self.plan.seconds
+    }
+
+    /// Size and scale that were asked for: a window is opened by the scale of its display, which nobody knows before.
+    fn settle(&mut self, ui: &egui::Ui) {
+        let context = ui.ctx();
+        let scale = context.pixels_per_point();
+        let size = context.viewport_rect().size() * scale;
+        self.figures.size = [size.x, size.y].map(|side| side.round() as u32);
+        if let Some(scale) = self.plan.scale {
+            context.set_pixels_per_point(scale);
+        }
+        if self.figures.size != self.plan.size {
+            let points = self.plan.size.map(|side| side as f32 / scale);
+            context.send_viewport_cmd(egui::ViewportCommand::InnerSize(points.into()));
+        }
     }
 
     /// Adds a frame, which follows one that took `work`.
@@ -150,7 +176,7 @@ impl Observer {
     }
 }
 
-impl Guest for Observer {
+impl Guest for Observer<'_> {
     fn add_input(&mut self, viewer: &Viewer, input: &mut egui::RawInput) {
         let Some(area) = viewer.picture.area.filter(|_| matches!(self.part, Part::Turning | Part::Done)) else {
             return;
@@ -183,9 +209,13 @@ impl Guest for Observer {
 
     fn after_frame(&mut self, viewer: &Viewer, ui: &egui::Ui, drawn: &Drawn<'_>) {
         self.note(viewer, drawn.work);
+        self.n_frames += 1;
+        if self.n_frames <= SETTLES {
+            self.settle(ui);
+        }
         match (&viewer.now.phase, self.part) {
             (Phase::Failed(error), _) => self.error = Some(error.clone()),
-            (_, Part::Opening) if viewer.now.painted.is_some() => {
+            (_, Part::Opening) if viewer.now.painted.is_some() && self.n_frames > SETTLES => {
                 self.figures.renderer.clone_from(&viewer.now.device);
                 if let Some(device) = drawn.device {
                     self.figures.window = device.adapter_info().name;
@@ -215,15 +245,26 @@ mod tests {
             return;
         }
         let set = ["size=32x24", "photons=500"].map(str::to_owned).to_vec();
-        let plan = |scene: &str| Plan { scene: scene.into(), set: set.clone(), seconds: 1.0, offscreen: true };
+        let plan = |scene: &str| Plan {
+            scene: scene.into(),
+            set: set.clone(),
+            seconds: 1.0,
+            size: [1500, 900],
+            scale: Some(1.25),
+            offscreen: true,
+        };
         let device = || Device::Cpu(sunfleck::scene::Accelerator::Bvh);
         let figures = run(device(), &plan("cornell")).unwrap();
         assert!(figures.renderer.starts_with("CPU") && !figures.window.is_empty(), "{figures:?}");
-        for frames in [&figures.resting, &figures.turning] {
-            assert!(!frames.intervals.is_empty() && frames.iterations > 0, "{frames:?}");
-            // Work is part of the time between frames.
+        assert_eq!(figures.size, [1500, 900]);
+        for Frames { intervals, work, iterations } in [&figures.resting, &figures.turning] {
+            assert!(!intervals.is_empty() && *iterations > 0, "{intervals:?}, {iterations}");
+            // The work of a frame lies in the time to the next, but for what the first did before the clock began.
+            assert_eq!(work.len(), intervals.len());
             let sum = |times: &[Duration]| times.iter().sum::<Duration>();
-            assert!(sum(&frames.work) <= sum(&frames.intervals) + Duration::from_secs(1), "{frames:?}");
+            assert!(sum(&work[1..]) <= sum(intervals), "{work:?} in {intervals:?}");
+            // They fill the part, but for the way to its first frame.
+            assert!(sum(intervals) > Duration::from_millis(500), "{intervals:?}");
         }
         assert!(!figures.waits.is_empty());
         let error = run(device(), &plan("nowhere.glb")).unwrap_err().to_string();

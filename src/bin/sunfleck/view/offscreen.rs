@@ -12,16 +12,14 @@ use eframe::{egui, wgpu};
 use super::app::Viewer;
 use super::window::{Bell, Drawn, Fault, Guest};
 
-/// Pixels, and as many points.
-const SIZE: [u32; 2] = [1280, 720];
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const REFRESH: Duration = Duration::from_micros(16_667);
 /// Frames that the device may be behind.
 const AHEAD: usize = 2;
 
-/// Shows `viewer` until `guest` closes it.
-pub fn run(viewer: &mut Viewer, bell: &Bell, guest: &mut impl Guest) -> Result<()> {
-    let mut canvas = Canvas::new()?;
+/// Shows `viewer` in a window of `size` pixels until `guest` closes it.
+pub fn run(viewer: &mut Viewer, bell: &Bell, guest: &mut impl Guest, size: [u32; 2]) -> Result<()> {
+    let mut canvas = Canvas::new(size)?;
     let context = egui::Context::default();
     bell.hang(&context);
     viewer.enter(None);
@@ -30,8 +28,9 @@ pub fn run(viewer: &mut Viewer, bell: &Bell, guest: &mut impl Guest) -> Result<(
     loop {
         let now = Instant::now();
         next = (next + REFRESH).max(now);
+        let points = size.map(|side| side as f32 / context.pixels_per_point());
         let mut input = egui::RawInput {
-            screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, SIZE.map(|side| side as f32).into())),
+            screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, points.into())),
             max_texture_side: Some(canvas.device.limits().max_texture_dimension_2d as usize),
             time: Some((now - began).as_secs_f64()),
             focused: true,
@@ -59,6 +58,7 @@ pub fn run(viewer: &mut Viewer, bell: &Bell, guest: &mut impl Guest) -> Result<(
 struct Canvas {
     device: wgpu::Device,
     queue: wgpu::Queue,
+    size: [u32; 2],
     renderer: Renderer,
     view: wgpu::TextureView,
     fault: Fault,
@@ -67,19 +67,24 @@ struct Canvas {
 
 impl Canvas {
     /// On the adapter that eframe would choose, apart from what the display asks of it.
-    fn new() -> Result<Self> {
+    fn new(size: [u32; 2]) -> Result<Self> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
         let wanted = wgpu::RequestAdapterOptions {
             power_preference: wgpu::PowerPreference::HighPerformance,
             ..Default::default()
         };
         let adapter = pollster::block_on(instance.request_adapter(&wanted)).context("no adapter to draw with")?;
-        let descriptor = wgpu::DeviceDescriptor { required_limits: adapter.limits(), ..Default::default() };
+        let limits = adapter.limits();
+        let most = limits.max_texture_dimension_2d;
+        if size.iter().any(|&side| side > most) {
+            bail!("the window may have {most} pixels a side: {} allows no more", adapter.get_info().name);
+        }
+        let descriptor = wgpu::DeviceDescriptor { required_limits: limits, ..Default::default() };
         let (device, queue) =
             pollster::block_on(adapter.request_device(&descriptor)).context("no device to draw with")?;
         let fault = Fault::default();
         fault.watch(&device, || ());
-        let [width, height] = SIZE;
+        let [width, height] = size;
         let view = device
             .create_texture(&wgpu::TextureDescriptor {
                 label: Some("window"),
@@ -93,12 +98,12 @@ impl Canvas {
             })
             .create_view(&wgpu::TextureViewDescriptor::default());
         let renderer = Renderer::new(&device, FORMAT, RendererOptions::default());
-        Ok(Self { device, queue, renderer, view, fault, submitted: VecDeque::new() })
+        Ok(Self { device, queue, size, renderer, view, fault, submitted: VecDeque::new() })
     }
 
     /// Returns what the queue took, which eframe counts as waiting for the display.
     fn draw(&mut self, context: &egui::Context, mut output: egui::FullOutput) -> Result<Duration> {
-        let screen = ScreenDescriptor { size_in_pixels: SIZE, pixels_per_point: output.pixels_per_point };
+        let screen = ScreenDescriptor { size_in_pixels: self.size, pixels_per_point: output.pixels_per_point };
         let shapes = context.tessellate(output.shapes, output.pixels_per_point);
         for (id, deltas) in output.textures_delta.set.drain() {
             for delta in &deltas {
