@@ -26,7 +26,7 @@ const MOST_DECADES: f64 = 100.0;
 const MOST_LINEAR: f64 = 1e9;
 
 /// Width that the errors need beside the choice of plots, points.
-const FIGURES_WIDTH: f32 = 260.0;
+const FIGURES_WIDTH: f32 = 380.0;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
@@ -136,6 +136,7 @@ struct Curve {
 }
 
 /// Points of the history, few enough to draw.
+#[derive(Clone)]
 struct Sample {
     records: Vec<Record>,
     /// Fewer of them.
@@ -202,9 +203,11 @@ fn heading(ui: &mut egui::Ui, view: &mut Convergence, (_, estimated, measured, _
             ui.checkbox(shown, kind.name()).on_hover_text(format!("{}. {help}.", kind.describe()));
         }
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            // The estimate is of what is left without fireflies, and so is what is trimmed.
+            let trimmed = |m: &Measured| m.trimmed.map_or(String::new(), |trimmed| format!(" ({trimmed:.2e} trimmed)"));
             let text = [("measured", measured), ("estimated", estimated)]
                 .iter()
-                .filter_map(|(what, last)| Some(format!("{what} {:.2e}", last.as_ref()?.rel_mse)))
+                .filter_map(|(what, last)| last.as_ref().map(|m| format!("{what} {:.2e}{}", m.rel_mse, trimmed(m))))
                 .collect::<Vec<_>>();
             if !text.is_empty() && ui.available_width() >= FIGURES_WIDTH {
                 ui.label(format!("relMSE {}", text.join(", "))).on_hover_text(Kind::Error.describe());
@@ -347,16 +350,17 @@ fn curves(kind: Kind, sample: &Sample, alpha: f64, by_seconds: bool) -> Vec<Curv
             {
                 let points = measured.iter().map(|m| [at(m.iteration, m.seconds), m.rel_mse.log10()]).collect();
                 let curve = solid(number, name, points);
-                let slope = slope(&curve.points, exponent);
+                // The theory is of means: a single bright pixel is not to move its line.
+                let trimmed = measured.iter().filter_map(|m| Some([at(m.iteration, m.seconds), m.trimmed?.log10()]));
+                let trimmed = finite(trimmed.collect());
+                let slope = slope(if trimmed.is_empty() { &curve.points } else { &trimmed }, exponent);
                 curves.push(curve);
                 let name = if by_seconds { "t" } else { "N" };
                 let place = Place { number, dashed: true };
                 curves.push(Curve { name: format!("{name}^−{exponent:.2}"), points: slope, place });
-            }
-            let trimmed = |m: &Measured| Some([at(m.iteration, m.seconds), m.trimmed?.log10()]);
-            let trimmed: Vec<_> = sample.against_reference.iter().filter_map(trimmed).collect();
-            if !trimmed.is_empty() {
-                curves.push(solid(2, "trimmed", trimmed));
+                if !trimmed.is_empty() {
+                    curves.push(solid(number + 1, "trimmed", trimmed));
+                }
             }
             curves
         }
@@ -500,6 +504,13 @@ mod tests {
         let names: [Vec<String>; 2] = [0.9, 2.0 / 3.0].map(names);
         assert_eq!(names[0], ["noise, estimated", "t^−0.90", "measured", "t^−0.20"]);
         assert_eq!((&names[1][1], &names[1][3]), (&"t^−0.67".to_owned(), &"t^−0.67".to_owned()));
+        // The worst pixels left out, the slope is of what is left.
+        let mut with_trimmed = with_reference.clone();
+        with_trimmed.against_reference.iter_mut().for_each(|m| m.trimmed = Some(0.5 * m.rel_mse));
+        let error = curves(Kind::Error, &with_trimmed, 0.5, false);
+        let [measured, slope, trimmed] = [2, 3, 4].map(|i| &error[i]);
+        assert_eq!((&*trimmed.name, trimmed.place.number), ("trimmed", 2));
+        assert!(slope.points.last() == trimmed.points.last() && slope.points.last() != measured.points.last());
         // A line keeps its colour when the noise, which takes two iterations, comes beside it.
         let alone = curves(Kind::Error, &Sample { estimated: vec![], ..with_reference }, 0.5, false);
         assert_eq!((&*alone[0].name, alone[0].place), ("measured", Place { number: 1, dashed: false }));

@@ -150,10 +150,11 @@ fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
             false => rgba(false_colour::colour(t)),
         };
         bar(ui, "Legend", legend.range, legend.log, unit, map);
-        if legend.log {
+        let shows_depth = painted.difference().is_none() && painted.painting.view == View::Depth;
+        if legend.log || shows_depth {
             ui.horizontal(|ui| {
                 ui.label(RichText::new("■").color(rgba(NOTHING)));
-                ui.weak("0: nothing");
+                ui.weak(if shows_depth { "nothing met" } else { "0: nothing" });
             });
         }
     }

@@ -557,12 +557,12 @@ fn scalar(values: Vec<f32>, log: bool) -> Colours {
     Colours { rgba, values: Values::Scalar(Arc::new(values)), legend, mean: None }
 }
 
-/// What is endlessly far away looks like what is farthest.
+/// Where nothing is met it is endlessly far, which has no place on the scale.
 fn far(colours: &mut Colours) {
     let Values::Scalar(depths) = &colours.values else { return };
     for (rgba, depth) in colours.rgba.chunks_exact_mut(4).zip(depths.iter()) {
         if *depth == f32::INFINITY {
-            rgba.copy_from_slice(&false_colour::colour(1.0));
+            rgba.copy_from_slice(&NOTHING);
         }
     }
 }

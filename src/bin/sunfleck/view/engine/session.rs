@@ -350,7 +350,8 @@ pub mod tests {
     /// A small one, of estimate 1, on the processor.
     pub fn session(interrupt: Interrupt) -> Session {
         let set = ["size=32x24", "photons=500"].map(str::to_owned).to_vec();
-        let opened = reading::open(&Arc::new(Choice { name: "cornell".to_owned(), set })).unwrap();
+        let opened =
+            reading::open(&Arc::new(Choice { name: "cornell".to_owned(), set }), &Interrupt::default()).unwrap();
         let settings = opened.source.settings.clone();
         let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default()).unwrap();
         let device = Device::Cpu(Accelerator::Bvh);

@@ -61,7 +61,7 @@ fn all_of_a_closed_room_is_seen_from_inside() {
     let text = vertices.collect::<String>() + "usemtl wall\n" + sides + "usemtl lamp\nf 9 10 11 12\n";
     std::fs::write(&file, format!("mtllib room.mtl\n{text}")).unwrap();
     std::fs::write(window.path("room.mtl"), "newmtl wall\nKd 0.8 0.8 0.8\nnewmtl lamp\nKd 0 0 0\nKe 9 9 9\n").unwrap();
-    window.viewer().open(file.to_string_lossy());
+    window.viewer().open_with(file.to_string_lossy(), ["size=32x24", "photons=500"].map(str::to_owned).to_vec());
     window.wait_for_picture();
     let at = |window: &mut Window| window.viewer().rig().unwrap().camera().world_from_camera.translation;
     let opened_at = at(&mut window);
