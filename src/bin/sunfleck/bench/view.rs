@@ -164,7 +164,7 @@ fn print(machine: &Machine, plan: &Plan, found: &[(&str, Figures)]) {
         format!("{width}×{height} pixels drawn by {}", figures.window)
     });
     crate::print(&format!(
-        "{}\nThe window, {}, while {} renders; milliseconds: median / 95 % within / most\n{table}\
+        "{}\nThe window, {}, while {} renders; milliseconds: median / 95 % within / most\n{table}\n\
          The window is as smooth as “frame to frame” says; “interface thread” leaves out where that waits for the display.",
         machine.line(),
         drawn.unwrap_or_default(),
