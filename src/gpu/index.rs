@@ -67,12 +67,13 @@ pub(super) struct Index {
     pub(super) nodes: Array,
     /// [`levels`] of the last build.
     pub(super) levels: Vec<[u32; 2]>,
-    /// Parts of the sort, of [`Index::N_PARTS`], between two chances of an interrupt.
+    /// Parts of the sort between two chances of an interrupt: passes, and the move of the records.
     pub(super) parts_at_once: u32,
 }
 
 impl Index {
     /// Of a sort: each pass over a digit, and the move of the records; the tree besides counts as one.
+    #[cfg(feature = "render")]
     pub(super) const N_PARTS: u32 = N_PASSES + 2;
 
     pub(super) fn new(modules: &Modules<'_>, sorted: &Sorted) -> Result<Self, Error> {

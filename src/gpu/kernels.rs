@@ -136,6 +136,7 @@ struct Submitted {
 }
 
 /// How long something that was submitted took.
+#[cfg_attr(not(feature = "render"), expect(dead_code, reason = "only the stages of a render learn from it"))]
 pub(super) struct Took {
     /// Of what it did, as [`Batch::cut`] was told.
     pub(super) amount: u32,
@@ -284,6 +285,10 @@ pub(super) struct Batch<'a> {
 impl<'a> Batch<'a> {
     pub(super) fn new(context: &'a Context, shared: &'a Shared, label: &'a str) -> Self {
         let scopes = Scopes::new(&context.device);
+        if let Some(last) = &mut shared.queue().last {
+            // Of another batch, which counts something else.
+            last.amount = 0;
+        }
         Self { context, shared, label, scopes, encoder: encoder(context, label), arguments: Vec::new() }
     }
 

@@ -11,11 +11,11 @@ const ALLOWED: [(&str, &[&str]); 13] = [
     ("points", &["files", "index", "math"]),
     ("mesh", &["files", "index", "math", "points"]),
     ("layout", &["index", "math"]),
-    ("scene", &["files", "mesh", "layout", "index", "math"]),
+    ("scene", &["files", "mesh", "device", "layout", "index", "math"]),
     ("ppm", &["scene", "layout", "device", "index", "math"]),
     ("cpu", &["ppm", "scene", "layout", "device", "index", "math"]),
     ("gpu", &["ppm", "scene", "layout", "device", "index", "math"]),
-    ("inspect", &["cpu", "ppm", "scene", "layout", "index", "math"]),
+    ("inspect", &["cpu", "ppm", "scene", "layout", "device", "index", "math"]),
     ("output", &["files", "ppm", "scene", "layout", "index", "math"]),
 ];
 

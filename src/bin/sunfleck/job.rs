@@ -70,7 +70,7 @@ impl Job {
         let mut source = Source::resolve(&scene_name)?;
         source.set(&args.pairs()?)?;
         for path in args.output.iter().chain(&args.json) {
-            source.check_not_read(path)?;
+            source.check_not_read(&source.settings, path)?;
         }
         let settings = &source.settings;
         let iterations = args.iterations.or(settings.iterations.map(|n| n.0));
@@ -235,12 +235,15 @@ fn check_outputs(args: &RenderArgs) -> Result<()> {
     Ok(())
 }
 
+/// Whether the picture or the photons of an iteration need more memory than those of `before`.
+#[cfg(feature = "view")]
+pub fn needs_more(params: &Params, before: &Params) -> bool {
+    needed(params).into_iter().zip(needed(before)).any(|(needs, needed)| needs > needed)
+}
+
 /// Refuses a picture or a number of photons that this machine has no room for, beside what is there but for that of `held`,
 /// whose place they take.
 pub fn check_memory(params: &Params, held: Option<&Params>) -> Result<()> {
-    if held.is_some_and(|held| needed(params).iter().zip(needed(held)).all(|(needs, has)| *needs <= has)) {
-        return Ok(());
-    }
     let [width, height] = params.film_size();
     let what =
         [format!("a picture of {width}x{height} pixels"), format!("{} photon paths an iteration", params.n_paths)];

@@ -31,8 +31,11 @@ pub struct Source {
     pub settings: Settings,
     /// Where the settings file lies.
     pub folder: PathBuf,
-    kept: Arc<Mutex<Option<Kept>>>,
+    kept: Arc<Mutex<Vec<Kept>>>,
 }
+
+/// Environments that are kept: the one that lights the scene, and one that is about to.
+const MOST_KEPT: usize = 2;
 
 /// An environment as its file had it: read once, though settings are applied at every edit in the window.
 #[derive(Debug)]
@@ -90,9 +93,9 @@ impl Source {
         }
     }
 
-    /// Refuses to write over a file that the scene is made from: settings, scene, environment.
-    pub fn check_not_read(&self, path: &Path) -> Result<(), Usage> {
-        let environment = self.settings.environment.as_ref().and_then(|environment| environment.file.as_ref());
+    /// Refuses to write over a file that the scene is made from with `settings`: those, the scene, the environment.
+    pub fn check_not_read(&self, settings: &Settings, path: &Path) -> Result<(), Usage> {
+        let environment = settings.environment.as_ref().and_then(|environment| environment.file.as_ref());
         let environment = environment.map(|file| self.folder.join(file));
         let read = [Some(PathBuf::from(&self.name)), Some(self.file.clone()), environment];
         match read.iter().flatten().any(|read| read.is_file() && same_file(read, path)) {
@@ -154,20 +157,22 @@ impl Source {
         Ok(())
     }
 
-    /// Reads an environment, unless it was the last one read and its file is as it was.
+    /// Reads an environment, unless it is one of the last read and its file is as it was.
     fn environment(&self, path: &Path) -> Result<(Environment, Vec<String>), LoadError> {
-        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let now = stamp(path);
-        if let Some(kept) = kept.as_ref().filter(|kept| kept.path == path && Some(&kept.stamp) == now.as_ref()) {
+        if let Some(kept) = kept().iter().find(|kept| kept.path == path && Some(&kept.stamp) == now.as_ref()) {
             return Ok((kept.environment.clone(), kept.warnings.clone()));
         }
+        // Long, perhaps: somebody else may need another meanwhile.
         let (environment, warnings) = load_environment(path)?;
-        *kept = now.map(|stamp| Kept {
-            path: path.to_owned(),
-            stamp,
-            environment: environment.clone(),
-            warnings: warnings.clone(),
-        });
+        let mut kept = kept();
+        kept.retain(|kept| kept.path != path);
+        if let Some(stamp) = now {
+            let (environment, warnings) = (environment.clone(), warnings.clone());
+            kept.insert(0, Kept { path: path.to_owned(), stamp, environment, warnings });
+            kept.truncate(MOST_KEPT);
+        }
         Ok((environment, warnings))
     }
 }
@@ -248,7 +253,7 @@ pub fn export(args: &ExportArgs) -> Result<ExitCode> {
     }
     atomic::check(path)?;
     let source = Source::resolve(&args.scene)?;
-    source.check_not_read(path)?;
+    source.check_not_read(&source.settings, path)?;
     let mut loaded = source.scene()?;
     // The soft sky of a scene without light is no part of it: who reads the file gives it the same, if nothing is changed
     // about light.
@@ -267,7 +272,7 @@ pub fn export(args: &ExportArgs) -> Result<ExitCode> {
     let bytes = glb_bytes(&scene)?;
     let beside = path.with_extension("hdr");
     if scene.environment.is_some() {
-        source.check_not_read(&beside)?;
+        source.check_not_read(&source.settings, &beside)?;
     }
     atomic::write(path, |writer| writer.write_all(&bytes))?;
     eprintln!("wrote {}", path.display());
@@ -302,7 +307,7 @@ mod tests {
         let texel = || source.environment(&path).unwrap().0.texels[0].x;
         assert_eq!(texel(), 1.0);
         // What is kept is what comes, as long as the file is the same.
-        source.kept.lock().unwrap().as_mut().unwrap().environment = sky(4.0);
+        source.kept.lock().unwrap()[0].environment = sky(4.0);
         assert_eq!(texel(), 4.0);
         export::write_environment_hdr(&sky(2.0), &path).unwrap();
         let file = std::fs::File::options().write(true).open(&path).unwrap();

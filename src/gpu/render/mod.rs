@@ -32,7 +32,7 @@ const PHOTON_WORDS: u32 = (size_of::<Photon>() / 4) as u32;
 const ALIGNED_PIXELS: u32 = 64;
 /// The film is cut at multiples of this many rows: a workgroup's.
 const TILE: u32 = 8;
-/// Pixels of the largest dispatches: 112 bytes each have to fit a binding.
+/// Pixels of the largest dispatches, and up to seven rows more: 112 bytes each have to fit a binding.
 const MOST_PIXELS: u32 = 1 << 19;
 /// Seconds a dispatch may take unless the caller says, well below what watchdogs allow.
 const DISPATCH_SECONDS: f64 = 0.1;

@@ -38,7 +38,8 @@ impl Pace {
             && took > 0.0
         {
             let fitting = self.fitting(f64::from(amount) * seconds / took);
-            self.amount = fitting.min(self.amount.saturating_mul(GROWTH));
+            // It may have done more than it was to, there being a least.
+            self.amount = fitting.min(self.amount.max(amount).saturating_mul(GROWTH));
         }
     }
 

@@ -23,6 +23,8 @@ const N_TOTALS: u32 = 4;
 const THREADS: u32 = 64;
 /// Workgroups of the smallest dispatches of paths.
 const FEWEST_GROUPS: u32 = 16;
+/// As many more in the rounds after the first, where most paths have ended.
+const LATER: u32 = 4;
 
 /// Kernels and memory of the photon paths.
 pub(super) struct PhotonPaths {
@@ -131,10 +133,15 @@ impl PhotonPaths {
                     if group > 0 {
                         self.pace.learn(batch.cut(std::mem::take(&mut begun))?, dispatch_seconds);
                     }
-                    let part = self.pace.amount().max(FEWEST_GROUPS).min(groups - group);
+                    let amount = self.pace.amount().max(FEWEST_GROUPS) * if round == 0 { 1 } else { LATER };
+                    let part = amount.min(groups - group);
                     batch.dispatch(&self.trace, &buffers, [n, first, round, group], part);
                     begun += if round == 0 { part } else { 0 };
                     group += part;
+                }
+                if begun < groups {
+                    // The last part may be a small one, and what is below goes with it.
+                    begun = 0;
                 }
                 let buffers = [self.slots.all(), self.counters.all(), self.states.all(), photons.all()];
                 let last = u32::from(round + 1 == self.rounds);

@@ -158,10 +158,13 @@ fn far_away(scene: &Scene) -> Option<String> {
     let [low, high] = scene.bounds(&[])?;
     let (size, farthest) = (low.distance(high), low.abs().max(high.abs()).max_element());
     let step = farthest * f32::EPSILON;
+    let metres = |x: f32| if x < 10.0 { format!("{x:.1e} m") } else { format!("{x:.0} m") };
     (step > COARSE * size && size > 0.0).then(|| {
         format!(
-            "lies up to {farthest:.0} m from the origin, where coordinates are {step:.1e} m apart: too coarse for a scene of \
-             {size:.3} m; move it to the origin"
+            "lies {} from the origin, where coordinates are {} apart: too coarse for a scene of {}; move it to the origin",
+            metres(farthest),
+            metres(step),
+            metres(size)
         )
     })
 }

@@ -58,7 +58,7 @@ impl First {
         if let Some(choice) = &choice {
             let mut source = Source::resolve(&choice.name)?;
             source.set(&choice.set)?;
-            args.output.iter().try_for_each(|path| source.check_not_read(path))?;
+            args.output.iter().try_for_each(|path| source.check_not_read(&source.settings, path))?;
         }
         let limits = Limits { iterations: args.iterations, seconds: args.seconds, noise: args.noise };
         Ok(Self { choice, always, limits, output: args.output.clone(), reference: args.reference.clone() })
@@ -78,6 +78,16 @@ fn make_legible(ctx: &egui::Context) {
             });
         }
     }
+}
+
+/// Where the picture of a scene goes without asking.
+#[derive(Debug)]
+pub struct Place {
+    /// The first that is opened, if none.
+    pub scene: Option<Arc<Choice>>,
+    /// Its file, without links, if it has been opened.
+    pub file: Option<PathBuf>,
+    pub path: PathBuf,
 }
 
 /// See [`Viewer::last_save`].
@@ -100,8 +110,7 @@ pub struct Viewer {
     pub selected: Option<usize>,
     /// Whether something was open, when this frame began, that a click beside it closes.
     pub had_popup: bool,
-    /// Where the picture of which scene goes without asking; of the first that is opened, if none is named.
-    pub saved_as: Vec<(Option<Arc<Choice>>, PathBuf)>,
+    pub saved_as: Vec<Place>,
     last_save: LastSave,
     pub convergence: super::convergence::Convergence,
     pub timing: super::timing::Timing,
@@ -132,8 +141,11 @@ pub struct Viewer {
 impl Viewer {
     pub fn new(engine: Engine, wake: Wake, first: First) -> Self {
         let now = engine.now();
-        let wanted = Wanted { scene: first.choice.map(Arc::new), limits: first.limits, ..Wanted::default() };
-        let saved_as = first.output.map(|path| (wanted.scene.clone(), path)).into_iter().collect();
+        let scene = first.choice.map(Arc::new);
+        let limits_at_first = Some(first.limits);
+        let wanted = Wanted { scene, limits: first.limits, limits_at_first, ..Wanted::default() };
+        let saved_as = first.output.map(|path| Place { scene: wanted.scene.clone(), file: None, path });
+        let saved_as = saved_as.into_iter().collect();
         Self {
             engine,
             wanted,
@@ -198,6 +210,7 @@ impl Viewer {
         }
         self.wanted.scene = Some(Arc::new(Choice { name: name.into(), set: [set, self.always.clone()].concat() }));
         (self.wanted.settings, self.wanted.reads_again) = (None, false);
+        self.wanted.limits_at_first = Some(self.limits.flags());
         self.wanted.reloads += 1;
     }
 
@@ -205,6 +218,7 @@ impl Viewer {
     pub fn back(&mut self) {
         self.wanted.scene = self.previous.take();
         (self.wanted.settings, self.wanted.reads_again) = (None, false);
+        self.wanted.limits_at_first = Some(self.limits.flags());
         self.wanted.reloads += 1;
     }
 
@@ -368,7 +382,11 @@ impl Viewer {
 
     /// Writes the picture to `path`, as it looks now.
     pub fn save_to(&mut self, path: PathBuf) {
-        self.engine.save(self.saving_to(path));
+        let read = self.editing.as_ref().map(|opened| opened.source.check_not_read(self.edits.now(), &path));
+        match read {
+            Some(Err(Usage(why))) => self.engine.speaker()(Message::Error(why)),
+            _ => self.engine.save(self.saving_to(path)),
+        }
     }
 
     /// The picture as it looks now, to be written to `path`.
@@ -383,13 +401,15 @@ impl Viewer {
 
     /// Where saving goes without asking.
     pub fn place(&self) -> Option<&PathBuf> {
-        self.saved_as.iter().find(|(scene, _)| *scene == self.wanted.scene).map(|(_, path)| path)
+        self.saved_as.iter().find(|place| place.scene == self.wanted.scene).map(|place| &place.path)
     }
 
     /// Where the picture of the scene goes from now on, as long as the program runs.
     pub fn set_place(&mut self, path: PathBuf) {
-        self.saved_as.retain(|(scene, _)| *scene != self.wanted.scene);
-        self.saved_as.push((self.wanted.scene.clone(), path));
+        let scene = self.wanted.scene.clone();
+        let file = self.editing.as_ref().and_then(|opened| opened.source.canonical.clone());
+        self.saved_as.retain(|place| place.scene != scene);
+        self.saved_as.push(Place { scene, file, path });
     }
 
     /// Shows a message.
@@ -509,16 +529,20 @@ impl Viewer {
                     }
                     None => {
                         self.wanted.limits = self.limits.of_next(self.wanted.limits, settings);
+                        self.wanted.limits_at_first = None;
                         self.edits = Edits::new(settings.clone());
                         self.wanted.settings = None;
                         self.picture = PictureView::default();
                     }
                 }
                 // It may have been saved under another path to the same file, or with other settings.
-                let is_it =
-                    |scene: &Option<Arc<Choice>>| scene.as_ref().is_none_or(|s| s.is_same_scene(&opened.choice));
-                if let Some((scene, _)) = self.saved_as.iter_mut().find(|(scene, _)| is_it(scene)) {
-                    *scene = Some(Arc::clone(&opened.choice));
+                let file = &opened.source.canonical;
+                let is_it = |place: &&mut Place| match &place.scene {
+                    Some(scene) => scene.name == opened.choice.name || file.is_some() && place.file == *file,
+                    None => true,
+                };
+                if let Some(place) = self.saved_as.iter_mut().find(is_it) {
+                    (place.scene, place.file) = (Some(Arc::clone(&opened.choice)), file.clone());
                 }
             }
         }

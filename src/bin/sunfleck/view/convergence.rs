@@ -414,7 +414,8 @@ fn narrowed(range: RangeInclusive<f64>, most: f64) -> Option<RangeInclusive<f64>
 /// Decades, and what lies between them if there are few.
 fn log_marks(input: GridInput) -> Vec<GridMark> {
     let (first, last) = (input.bounds.0.floor(), input.bounds.1.ceil());
-    if last - first > MOST_DECADES {
+    // Rounded outwards.
+    if last - first > MOST_DECADES + 2.0 {
         return vec![];
     }
     let between = if last - first > 8.0 { 1 } else { 9 };

@@ -22,8 +22,13 @@ impl Guard {
 
 impl Drop for Guard {
     fn drop(&mut self) {
-        *lock() = None;
+        disarm();
     }
+}
+
+/// Nothing is done any more, whoever exits.
+pub fn disarm() {
+    *lock() = None;
 }
 
 fn lock() -> MutexGuard<'static, Option<Last>> {

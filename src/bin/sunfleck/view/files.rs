@@ -13,7 +13,7 @@ use image::{ExtendedColorType, ImageEncoder};
 use sunfleck::scene::settings::EnvironmentSettings;
 
 use super::app::Viewer;
-use super::engine::{Choice, Message, catch};
+use super::engine::{Choice, Message, Opened, catch, is_same};
 use crate::cli::Usage;
 
 /// What a dialog was for.
@@ -50,7 +50,7 @@ pub struct Dialog {
 
 /// An environment that is being read, for the scene that is open.
 pub struct Sky {
-    scene: Arc<Choice>,
+    opened: Arc<Opened>,
     /// As the settings name it.
     file: String,
     done: mpsc::Receiver<Result<(), String>>,
@@ -238,13 +238,13 @@ fn read_environment(ui: &egui::Ui, viewer: &mut Viewer, path: &Path) {
         Err(error) => return viewer.say(ui, Message::Error(format!("{error:#}"))),
     };
     let (sender, done) = mpsc::channel();
-    let (scene, named, wake) = (Arc::clone(&opened.choice), file.clone(), viewer.wake());
+    let (source, named, wake) = (opened.source.clone(), file.clone(), viewer.wake());
     std::thread::spawn(move || {
-        let read = catch(|| opened.source.keep_environment(Path::new(&named)));
+        let read = catch(|| source.keep_environment(Path::new(&named)));
         let _ = sender.send(read.and_then(|read| read.map_err(|error| crate::one_line(&crate::chain(&error)))));
         wake();
     });
-    viewer.sky = Some(Sky { scene, file, done });
+    viewer.sky = Some(Sky { opened, file, done });
 }
 
 /// Lights the scene with an environment that has been read.
@@ -255,11 +255,12 @@ fn poll_sky(ui: &egui::Ui, viewer: &mut Viewer) {
         Err(mpsc::TryRecvError::Empty) => return,
         Err(mpsc::TryRecvError::Disconnected) => Err(format!("{}: cannot be read", sky.file)),
     };
-    let Some(Sky { scene, file, .. }) = viewer.sky.take() else { return };
-    if viewer.wanted.scene.as_ref() != Some(&scene) {
-        return;
-    }
+    let Some(Sky { opened, file, .. }) = viewer.sky.take() else { return };
     match read {
+        Ok(()) if !is_same(Some(&opened), viewer.opened()) => {
+            let text = format!("{file} was not taken: the scene it was for has been left, or read again");
+            viewer.say(ui, Message::Error(text));
+        }
         Ok(()) => {
             let message = format!("{} is the environment", name_of(Path::new(&file)));
             let environment = EnvironmentSettings { file: Some(file), ..EnvironmentSettings::default() };
@@ -289,8 +290,11 @@ pub fn dropped(ui: &egui::Ui, viewer: &mut Viewer, paths: &[PathBuf]) {
         },
         (None, Some(path)) if viewer.opened().is_some() => read_environment(ui, viewer, path),
         (None, Some(path)) => {
-            let text = format!("{}: the environment of which scene? open one first", path.display());
-            viewer.say(ui, Message::Error(text));
+            let what = match viewer.wanted.scene {
+                Some(_) => "the scene is still being read",
+                None => "the environment of which scene? open one first",
+            };
+            viewer.say(ui, Message::Error(format!("{}: {what}", path.display())));
         }
         (None, None) => {}
     }

@@ -45,7 +45,7 @@ pub fn run(args: &ViewArgs) -> Result<ExitCode> {
     let bell = window::Bell::default();
     let engine = engine::Engine::start(device, bell.wake())?;
     let mut viewer = Viewer::new(engine, bell.wake(), first);
-    let mut signals = signals::Signals::install(bell.wake())?;
+    let mut signals = signals::Signals::install(&viewer, bell.wake())?;
     window::run(&mut viewer, &bell, window::options, &mut signals)?;
-    Ok(signals.end(&viewer))
+    Ok(signals.end())
 }

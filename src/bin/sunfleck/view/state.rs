@@ -111,6 +111,11 @@ impl LimitsOfScenes {
         Self { flags, ..Self::default() }
     }
 
+    /// Those for every scene.
+    pub fn flags(&self) -> Limits {
+        self.flags
+    }
+
     /// The limits that a scene with these settings begins with; `now` are those of the scene before.
     pub fn of_next(&mut self, now: Limits, settings: &Settings) -> Limits {
         let flags = self.flags;

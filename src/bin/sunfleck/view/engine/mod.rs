@@ -50,6 +50,14 @@ pub struct Limits {
     pub noise: Option<f64>,
 }
 
+impl Limits {
+    /// With those of a settings file where there are none.
+    pub fn or_of(self, settings: &Settings) -> Self {
+        let iterations = self.iterations.or(settings.iterations.map(|n| n.0));
+        Self { iterations, seconds: self.seconds.or(settings.seconds), ..self }
+    }
+}
+
 /// A scene to open.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
@@ -57,14 +65,6 @@ pub struct Choice {
     pub name: String,
     /// `key=value`, over its settings.
     pub set: Vec<String>,
-}
-
-impl Choice {
-    /// Whether both are of one file, or of one shipped scene.
-    pub fn is_same_scene(&self, other: &Self) -> bool {
-        let file = |choice: &Self| Path::new(&choice.name).canonicalize().ok();
-        self.name == other.name || file(self).is_some_and(|name| Some(name) == file(other))
-    }
 }
 
 /// What the interface wants. Cheap to clone and to compare.
@@ -87,7 +87,17 @@ pub struct Wanted {
     /// Counts requests to do again what failed, with the device opened anew if it was lost.
     pub retries: u32,
     pub limits: Limits,
+    /// In their place, for a scene that the interface has not seen yet: those for every scene, with what its settings say where
+    /// there are none.
+    pub limits_at_first: Option<Limits>,
     pub painting: Painting,
+}
+
+impl Wanted {
+    /// The limits of a scene that was opened with these settings.
+    pub fn limits_with(&self, settings: &Settings) -> Limits {
+        self.limits_at_first.map_or(self.limits, |given| given.or_of(settings))
+    }
 }
 
 /// What the render thread is doing.
@@ -130,7 +140,10 @@ impl Opened {
     /// The material called as the one of that index was in a version before.
     pub fn material_as(&self, before: &Self, index: usize) -> Option<usize> {
         let name = &before.loaded.scene.materials.get(index)?.name;
-        self.loaded.scene.materials.iter().position(|material| material.name == *name)
+        let materials = &self.loaded.scene.materials;
+        // Several may have the name.
+        let same = materials.get(index).is_some_and(|material| material.name == *name).then_some(index);
+        same.or_else(|| materials.iter().position(|material| material.name == *name))
     }
 
     /// What renders this scene, called `scene`, with `settings` on the command line, on the device that the flags say.
@@ -354,8 +367,14 @@ impl Engine {
         });
     }
 
+    /// What other threads ask how many seconds the newest picture has taken.
+    pub fn clock(&self) -> impl Fn() -> f64 + Send + Sync + 'static {
+        let shared = Arc::clone(&self.shared);
+        move || shared.board().frame.as_ref().map_or(0.0, |frame| frame.seconds)
+    }
+
     /// What other threads write what there is with, and come back when that is done: for the end.
-    pub fn writer(&self) -> impl Fn(&Save) -> Result<()> + Send + 'static {
+    pub fn writer(&self) -> impl Fn(&Save) -> Result<()> + Send + Sync + 'static {
         let shared = Arc::clone(&self.shared);
         move |save| {
             let ready = save.ready(&shared.board()).unwrap_or(Err("there is no picture yet"));

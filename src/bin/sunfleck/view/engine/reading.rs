@@ -45,9 +45,10 @@ impl Reader {
         self.n_reading.fetch_add(1, Ordering::Relaxed);
         let started = Builder::new().name("read".to_owned()).spawn(move || {
             let read = catch(|| read(&interrupt)).unwrap_or_else(|panic| Err(anyhow!(panic)));
+            // Before somebody takes the result, and begins with the next.
+            n_reading.fetch_sub(1, Ordering::Relaxed);
             *result.lock().unwrap_or_else(PoisonError::into_inner) = Some(read);
             drop(result);
-            n_reading.fetch_sub(1, Ordering::Relaxed);
             theirs.update(|_| ());
         });
         if let Err(error) = started {

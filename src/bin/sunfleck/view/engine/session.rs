@@ -325,7 +325,7 @@ impl Session {
 
     /// Whether a limit is reached.
     pub fn is_done(&self, wanted: &Wanted, noise: Option<f64>) -> bool {
-        let limits = &wanted.limits;
+        let limits = wanted.limits_with(&self.opened.source.settings);
         !self.is_preview
             && (limits.iterations.is_some_and(|n| self.n_iterations >= n)
                 || limits.seconds.is_some_and(|s| self.seconds >= s)
@@ -379,7 +379,7 @@ pub mod tests {
         long_ago(&mut session, 1, 0);
         assert!(session.frame_if_due(false, NOTHING).unwrap().is_none());
         frame.unwrap().is_taken.store(true, Ordering::Relaxed);
-        for (film, insides) in [(200, 0), (1, 100_000)] {
+        for (film, insides) in [(20_000, 0), (1, 200_000)] {
             long_ago(&mut session, film, insides);
             assert!(session.frame_if_due(false, NOTHING).unwrap().is_none());
         }

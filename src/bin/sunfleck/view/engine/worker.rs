@@ -119,12 +119,12 @@ impl Have {
             // The memory of the device first; of a scene that is read again the picture stays, for the file may be broken.
             let opened_before = self.opened.take();
             self.session = None;
-            shared.update(|board| {
-                if !(wanted.reads_again && before.scene == wanted.scene) {
-                    (board.opened, board.frame, board.painted) = (None, None, None);
-                }
+            let stays = wanted.reads_again && before.scene == wanted.scene;
+            // Freed here, and not while others wait for the board.
+            drop(shared.update(|board| {
                 board.phase = if wanted.scene.is_some() { Phase::Loading } else { Phase::Empty };
-            });
+                (!stays).then(|| (board.opened.take(), board.frame.take(), board.painted.take()))
+            }));
             let Some(choice) = wanted.scene.clone() else { return Ok(()) };
             let is_left = |board: &Board| is_other_scene(wanted, &board.wanted);
             let Some(opened) = self.reader.read(shared, move |interrupt| reading::open(&choice, interrupt), is_left)?
@@ -139,11 +139,11 @@ impl Have {
                 *edited = Arc::new(edited.rebased(&before.source.settings, &opened.source.settings));
             }
             self.wanted = wanted.clone();
-            shared.update(|board| {
+            drop(shared.update(|board| {
                 board.messages.extend(device.cannot(&opened.source).into_iter().map(Message::Warning));
-                (board.opened, board.frame, board.painted) = (Some(opened), None, None);
                 board.wanted.settings.clone_from(&wanted.settings);
-            });
+                (board.opened.replace(opened), board.frame.take(), board.painted.take())
+            }));
             return self.prepare(shared, device, &wanted);
         }
         if is_stale || is_retry {
@@ -163,6 +163,7 @@ impl Have {
     /// Applies the settings, as far as possible to the scene that the device has.
     fn prepare(&mut self, shared: &Shared, device: &mut Device, wanted: &Wanted) -> Result<()> {
         let Some(opened) = self.opened.clone() else { return Ok(()) };
+        let on_host = device.backend() == "cpu";
         let settings = wanted.settings.as_deref().unwrap_or(&opened.source.settings).clone();
         let is_same_scene = |session: &Session| {
             Arc::ptr_eq(&session.opened, &opened) && of_scene(&session.settings) == of_scene(&settings)
@@ -171,13 +172,20 @@ impl Have {
             Some(session) => {
                 let held = session.input.params.clone();
                 job::prepare_again(&mut session.input, &settings, &opened.loaded.scene.cameras)?;
-                job::check_memory(&session.input.params, Some(&held))?;
+                let params = &session.input.params;
+                if job::needs_more(params, &held) {
+                    job::check_memory(params, on_host.then_some(&held))?;
+                }
                 session.settings = Arc::new(settings);
             }
             None => {
                 let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
-                job::check_memory(&input.params, self.session.as_ref().map(|session| &session.input.params))?;
-                if self.session.is_none() {
+                let held = self.session.as_ref().map(|session| &session.input.params);
+                if held.is_none_or(|held| job::needs_more(&input.params, held)) {
+                    job::check_memory(&input.params, held.filter(|_| on_host))?;
+                }
+                // What is read again is still there as it was.
+                if self.session.is_none() && !wanted.reads_again {
                     job::check_scene_memory(&input.scene).with_context(|| opened.source.name.clone())?;
                 }
                 shared.update(|board| board.phase = Phase::Preparing);
@@ -259,7 +267,8 @@ impl Have {
             frame => frame?,
         };
         if let Some(frame) = frame {
-            shared.update(|board| board.frame = Some(Arc::new(frame)));
+            // What nobody has taken is freed here, and not while others wait for the board.
+            drop(shared.update(|board| board.frame.replace(Arc::new(frame))));
         }
         if is_last {
             shared.enter(resting(wanted));

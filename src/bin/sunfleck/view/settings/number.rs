@@ -81,7 +81,9 @@ pub const NO_LIMIT: &str = "no limit";
 
 /// A whole number in a box of this size.
 pub fn whole(ui: &mut Ui, size: egui::Vec2, drag: DragValue<'_>) -> Response {
-    let read = |text: &str| if text.trim() == NO_LIMIT { Some(0.0) } else { Number::Plain.read(text) };
+    // 1,920 is neither two pixels nor meant to be.
+    let number = |text: &str| Number::Plain.read(text).filter(|number| number.fract() == 0.0);
+    let read = move |text: &str| if text.trim() == NO_LIMIT { Some(0.0) } else { number(text) };
     let drag = drag.update_while_editing(false).clip_text(true).clamp_existing_to_range(false);
     ui.add_sized(size, drag.custom_parser(read))
 }

@@ -1,6 +1,7 @@
 //! What people do without thinking: Escape, keys let go in any order, reading a file again, going back.
 
 use std::path::Path;
+use std::time::Duration;
 
 use eframe::egui;
 use egui::{Event, Key, Modifiers, Role, ViewportCommand};
@@ -9,6 +10,7 @@ use sunfleck::output::difference::Measure;
 use sunfleck::scene::settings::Count;
 
 use super::{NoPixels, Window};
+use crate::view::app::Place;
 use crate::view::engine::{Comparison, Limits, Phase, View, is_same};
 use crate::view::files::Answer;
 
@@ -240,9 +242,13 @@ fn a_file_says_when_its_scene_stops() {
         window.wait("scene", |viewer| viewer.opened().is_some() && !is_same(viewer.opened(), before.as_ref()));
         window.viewer().wanted.limits
     };
-    let first = open(&mut window, &own, &[]);
-    assert_eq!(first, Limits { iterations: Some(2), ..flags });
+    // Also before the window has seen the file: it may be hidden.
+    window.viewer().open(own.to_string_lossy());
+    window.step();
+    std::thread::sleep(Duration::from_millis(300));
     window.wait("limit", |viewer| viewer.now.phase == Phase::Reached);
+    assert_eq!(window.viewer().wanted.limits, Limits { iterations: Some(2), ..flags });
+    assert_eq!(window.viewer().now.frame.as_ref().unwrap().film.n_iterations, 2);
     let text = window.viewer().settings_text("a.toml".as_ref()).unwrap();
     assert!(text.contains("iterations = 2\n") && text.contains("seconds = 0.05\n"), "{text}");
     assert_eq!(open(&mut window, &bare, &[]), flags);
@@ -301,7 +307,7 @@ fn a_picture_is_not_saved_over_that_of_another_scene() {
     assert_eq!(window.viewer().place(), None);
     // Without a scene it is for the first that is opened.
     let mut window = Window::new(None);
-    window.viewer().saved_as = vec![(None, place.clone())];
+    window.viewer().saved_as = vec![Place { scene: None, file: None, path: place.clone() }];
     window.viewer().open("no such scene");
     window.wait("failure", |viewer| matches!(viewer.now.phase, Phase::Failed(_)));
     for (scene, expected) in [("cornell", Some(&place)), ("glass", None)] {
