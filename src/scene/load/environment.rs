@@ -4,9 +4,9 @@ use super::{LoadError, files};
 use crate::files::exr;
 use crate::scene::Environment;
 use glam::Vec3;
-use image::{ImageFormat, ImageReader, Limits};
+use image::{ImageError, ImageFormat, ImageReader, Limits};
 use std::f64::consts::PI;
-use std::io::Cursor;
+use std::io::{Cursor, ErrorKind};
 use std::path::Path;
 
 /// Texels kept, at most: what a renderer can tell apart, and a table to sample from that stays small.
@@ -70,9 +70,13 @@ fn read_hdr(bytes: &[u8]) -> Result<Downsampled, String> {
         reader.limits(limits);
         reader
     };
-    let (width, height) = reader().into_dimensions().map_err(|e| e.to_string())?;
+    let problem = |error: ImageError| match error {
+        ImageError::IoError(error) if error.kind() == ErrorKind::UnexpectedEof => "is cut off".to_owned(),
+        error => error.to_string(),
+    };
+    let (width, height) = reader().into_dimensions().map_err(problem)?;
     let mut map = Downsampled::new(width as usize, height as usize)?;
-    let decoded = reader().decode().map_err(|e| e.to_string())?.into_rgb32f();
+    let decoded = reader().decode().map_err(problem)?.into_rgb32f();
     for (x, y, pixel) in decoded.enumerate_pixels() {
         map.add(x as usize, y as usize, pixel.0);
     }

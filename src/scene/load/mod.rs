@@ -157,7 +157,7 @@ pub fn load_unless(path: &Path, interrupt: &Interrupt) -> Result<Loaded, LoadErr
 fn far_away(scene: &Scene) -> Option<String> {
     let [low, high] = scene.bounds(&[])?;
     let (size, farthest) = (low.distance(high), low.abs().max(high.abs()).max_element());
-    let step = farthest * f32::EPSILON;
+    let step = farthest.next_up() - farthest;
     let metres = |x: f32| if x < 10.0 { format!("{x:.1e} m") } else { format!("{x:.0} m") };
     (step > COARSE * size && size > 0.0).then(|| {
         format!(

@@ -54,6 +54,9 @@ impl Viewer {
 pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
     let painted = viewer.picture.painted().cloned();
     let painted = painted.as_deref();
+    // Beside what is in it, not over it.
+    let scroll = &mut ui.spacing_mut().scroll;
+    scroll.floating_allocated_width = scroll.bar_width;
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         section(ui, "View", |ui| view(ui, viewer, painted));
         section(ui, "Under the cursor", |ui| cursor(ui, viewer, painted));

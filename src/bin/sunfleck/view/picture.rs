@@ -166,7 +166,9 @@ fn click(ui: &egui::Ui, viewer: &mut Viewer, response: &egui::Response, rect: Re
     }
     let Some(point) = response.interact_pointer_pos() else { return };
     let frame = &painted.frame;
-    let hit = on_film(rect, painted.size, point).and_then(|at| inspect::pick(&frame.scene, &frame.view(), at));
+    // In the middle of the pixel, as the panel that tells of it.
+    let at = on_film(rect, painted.size, point).map(|at| at.floor() + 0.5);
+    let hit = at.and_then(|at| inspect::pick(&frame.scene, &frame.view(), at));
     let n_materials = viewer.opened().map_or(0, |opened| opened.loaded.scene.materials.len());
     viewer.selected = hit.map(|hit| hit.material as usize).filter(|&index| index < n_materials);
     if let (true, Some(hit)) = (response.double_clicked_by(PointerButton::Primary), hit) {

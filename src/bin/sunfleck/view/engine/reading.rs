@@ -71,6 +71,7 @@ pub fn open(choice: &Arc<Choice>, interrupt: &Interrupt) -> Result<Opened> {
     let read = source.settings.clone();
     source.set(&choice.set)?;
     let mut loaded = source.scene_unless(interrupt)?;
+    interrupt.check()?;
     let has_camera = !loaded.scene.cameras.is_empty();
     source.settings.add_default_camera(&mut loaded.scene);
     let bounds = loaded.scene.bounds(&source.settings.added_spheres()).unwrap_or([-0.5, 0.5].map(Vec3::splat));

@@ -160,6 +160,11 @@ impl Have {
         }
     }
 
+    /// Whether nobody wants the scene any more.
+    fn is_left(&self, board: &Board) -> bool {
+        board.quit || is_other_scene(&self.wanted, &board.wanted)
+    }
+
     /// Applies the settings, as far as possible to the scene that the device has.
     fn prepare(&mut self, shared: &Shared, device: &mut Device, wanted: &Wanted) -> Result<()> {
         let Some(opened) = self.opened.clone() else { return Ok(()) };
@@ -180,6 +185,10 @@ impl Have {
             }
             None => {
                 let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
+                if self.is_left(&shared.board()) {
+                    // What comes is long in a large scene, and nothing ends it.
+                    return Ok(());
+                }
                 let held = self.session.as_ref().map(|session| &session.input.params);
                 if held.is_none_or(|held| job::needs_more(&input.params, held)) {
                     job::check_memory(&input.params, held.filter(|_| on_host))?;
