@@ -243,6 +243,10 @@ fn title(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &mut Hidden) {
     });
 }
 
+fn plot_id(ui: &egui::Ui, kind: Kind, by_seconds: bool) -> egui::Id {
+    ui.make_persistent_id(("convergence", kind.name(), by_seconds))
+}
+
 fn plot(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &Hidden, by_seconds: bool) {
     let x_value = move |x: f64| match by_seconds {
         true => progress::seconds(10f64.powf(x)),
@@ -267,7 +271,8 @@ fn plot(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &Hidden, by_sec
         Some(format!("{plot_name}\n{}\n{x}", kind.value(position.y)))
     };
     let group = egui::Id::unique("convergence cursor");
-    let mut plot = Plot::new(("convergence", kind.name(), by_seconds))
+    let mut plot = Plot::new(kind.name())
+        .id(plot_id(ui, kind, by_seconds))
         .height(ui.available_height().max(40.0))
         .allow_scroll(false)
         .allow_boxed_zoom(false)
@@ -290,11 +295,12 @@ fn plot(ui: &mut egui::Ui, kind: Kind, curves: &[Curve], hidden: &Hidden, by_sec
     }
     let most = [MOST_DECADES, if kind.is_log() { MOST_DECADES } else { MOST_LINEAR }];
     plot.show(ui, |plot| {
-        let bounds = plot.plot_bounds();
-        if let Some(x) = narrowed(bounds.range_x(), most[0]) {
+        // Where somebody has zoomed: bounds that follow the lines are not to be held, and may be infinite before there are any.
+        let (bounds, follows) = (plot.plot_bounds(), plot.auto_bounds());
+        if let Some(x) = narrowed(bounds.range_x(), most[0]).filter(|_| !follows.x) {
             plot.set_plot_bounds_x(x);
         }
-        if let Some(y) = narrowed(bounds.range_y(), most[1]) {
+        if let Some(y) = narrowed(bounds.range_y(), most[1]).filter(|_| !follows.y) {
             plot.set_plot_bounds_y(y);
         }
         for Curve { name, points, place } in curves.iter().filter(|curve| !hidden.contains(&(kind, curve.place))) {
@@ -536,6 +542,25 @@ mod tests {
         sample.estimated[0].rel_mse = 0.0;
         assert_eq!(curves(Kind::Rate, &sample, 0.5, false)[1].points.len(), 3);
         assert_eq!(curves(Kind::Error, &sample, 0.5, false)[0].points.len(), 1);
+    }
+
+    /// The first iteration alone is a point, beside which there is as much room as its height, in milliseconds.
+    #[test]
+    fn plots_follow_their_lines_from_the_first_point_on() {
+        for kind in [Kind::Radius, Kind::Rate, Kind::Stages] {
+            let show = move |ui: &mut egui::Ui, n: &mut usize| {
+                let mut all = sample();
+                all.means.iter_mut().for_each(|record| record.times.eye *= 300.0);
+                let some = Sample { records: all.records[..*n].to_vec(), means: all.means[..*n].to_vec(), ..all };
+                plot(ui, kind, &curves(kind, &some, 0.5, false), &Hidden::new(), false);
+                let memory = egui_plot::PlotMemory::load(ui.ctx(), plot_id(ui, kind, false)).unwrap();
+                assert!(memory.auto_bounds.x && memory.auto_bounds.y, "{kind:?}");
+            };
+            let mut harness = egui_kittest::Harness::builder().with_accessibility_check(false).build_ui_state(show, 1);
+            harness.run_steps(5);
+            *harness.state_mut() = 4;
+            harness.run_steps(5);
+        }
     }
 
     #[test]
