@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::Picture;
 use super::tonemap::{ToneMap, automatic_exposure, srgb_encode};
+use crate::scene::settings::Settings;
 
 /// How a picture is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -15,6 +16,11 @@ pub struct Look {
 }
 
 impl Look {
+    /// As settings say.
+    pub fn of(settings: &Settings) -> Self {
+        Self { exposure: settings.exposure, tonemap: settings.tonemap.unwrap_or_default() }
+    }
+
     /// The exposure that `rgb` is shown with, stops.
     pub fn exposure_of(&self, rgb: &[[f32; 3]]) -> f32 {
         self.exposure.unwrap_or_else(|| automatic_exposure(rgb))

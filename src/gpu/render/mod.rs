@@ -305,7 +305,7 @@ impl Stages for GpuStages {
             let arguments = [rows.n, rows.first, rows.skipped(), 0];
             batch.dispatch(&self.trace_eye, &buffers, arguments, rows.workgroups());
             if rows.end() < frame.height {
-                self.eye_pace.learn(batch.cut(rows.pixels())?, self.dispatch_seconds);
+                self.eye_pace.learn(batch.cut(rows.pixels())?);
             }
             next = Rows::new(frame, rows.end(), self.eye_pace.amount());
         }
@@ -322,7 +322,6 @@ impl Stages for GpuStages {
             &mut self.photons,
             &mut self.readback,
             &mut self.timer,
-            self.dispatch_seconds,
         )?;
         Ok(())
     }
@@ -390,7 +389,7 @@ impl Stages for GpuStages {
             let arguments = self.index.arguments([rows.n, self.n_photons, n_levels, rows.skipped()]);
             batch.dispatch(&self.gather, &buffers, arguments, rows.workgroups());
             if rows.end() < frame.height {
-                self.gather_pace.learn(batch.cut(rows.pixels())?, self.dispatch_seconds);
+                self.gather_pace.learn(batch.cut(rows.pixels())?);
             }
             next = Rows::new(frame, rows.end(), self.gather_pace.amount());
         }

@@ -14,12 +14,14 @@ pub(super) struct Pace {
     /// What counts as one, of what a slow device does [`SLOWLY`].
     unit: u32,
     most: u32,
+    /// That a dispatch is to take.
+    seconds: f64,
 }
 
 impl Pace {
     /// `most` at a time.
     pub(super) fn new(unit: u32, most: u32) -> Self {
-        Self { amount: most, unit, most }
+        Self { amount: most, unit, most, seconds: f64::INFINITY }
     }
 
     /// What the next dispatch is to do.
@@ -29,15 +31,16 @@ impl Pace {
 
     /// Of something new, each dispatch of which is to take so many seconds: with what even a slow device does in them.
     pub(super) fn begin(&mut self, seconds: f64) {
+        self.seconds = seconds;
         self.amount = self.amount.min(self.fitting(SLOWLY * seconds / f64::from(self.unit)));
     }
 
-    /// From a dispatch that is done, if there is one; the next is to take so many seconds.
-    pub(super) fn learn(&mut self, took: Option<Took>, seconds: f64) {
+    /// From a dispatch that is done, if there is one.
+    pub(super) fn learn(&mut self, took: Option<Took>) {
         if let Some(Took { amount: amount @ 1.., seconds: took }) = took
             && took > 0.0
         {
-            let fitting = self.fitting(f64::from(amount) * seconds / took);
+            let fitting = self.fitting(f64::from(amount) * self.seconds / took);
             // It may have done more than it was to, there being a least.
             self.amount = fitting.min(self.amount.max(amount).saturating_mul(GROWTH));
         }
@@ -53,14 +56,14 @@ mod tests {
     use super::*;
 
     /// Amounts of the dispatches of a stage of `n` on a device that takes `cost(i)` for the i-th, two of which are under way.
-    fn stage(pace: &mut Pace, n: u32, seconds: f64, cost: impl Fn(u32) -> f64) -> Vec<(u32, f64)> {
+    fn stage(pace: &mut Pace, n: u32, cost: impl Fn(u32) -> f64) -> Vec<(u32, f64)> {
         let (mut first, mut done): (u32, Vec<(u32, f64)>) = (0, vec![]);
         while first < n {
             let amount = pace.amount().min(n - first);
             done.push((amount, (first..first + amount).map(&cost).sum()));
             first += amount;
             if let Some(&(amount, seconds_taken)) = done.len().checked_sub(2).and_then(|i| done.get(i)) {
-                pace.learn(Some(Took { amount, seconds: seconds_taken }), seconds);
+                pace.learn(Some(Took { amount, seconds: seconds_taken }));
             }
         }
         done
@@ -72,13 +75,13 @@ mod tests {
         pace.begin(0.004);
         assert_eq!(pace.amount(), 16_000);
         // A device that does 50 million in a second, ten times what was begun with.
-        let first = stage(&mut pace, 2_000_000, 0.004, |_| 2e-8);
+        let first = stage(&mut pace, 2_000_000, |_| 2e-8);
         assert!(first.iter().all(|(_, took)| *took < 0.0041) && first.len() < 20, "{first:?}");
-        let second = stage(&mut pace, 2_000_000, 0.004, |_| 2e-8);
+        let second = stage(&mut pace, 2_000_000, |_| 2e-8);
         assert_eq!(second.len(), 10);
         // One that is slower than was thought.
         pace.begin(0.004);
-        let slow = stage(&mut pace, 200_000, 0.004, |_| 1e-6);
+        let slow = stage(&mut pace, 200_000, |_| 1e-6);
         assert!(slow[4..].iter().all(|(_, took)| *took < 0.0041), "{slow:?}");
     }
 
@@ -87,7 +90,7 @@ mod tests {
         let mut pace = Pace::new(1, 1 << 19);
         pace.begin(0.004);
         let dense = |i: u32| if (500_000..700_000).contains(&i) { 2e-6 } else { 2e-8 };
-        let done = stage(&mut pace, 1_000_000, 0.004, dense);
+        let done = stage(&mut pace, 1_000_000, dense);
         assert!(done.iter().filter(|(_, took)| *took > 0.0041).count() <= 2, "{done:?}");
     }
 
@@ -95,7 +98,7 @@ mod tests {
     fn nothing_is_learnt_from_nothing() {
         let mut pace = Pace::new(1, 100);
         for took in [None, Some(Took { amount: 0, seconds: 1.0 }), Some(Took { amount: 5, seconds: 0.0 })] {
-            pace.learn(took, 0.001);
+            pace.learn(took);
             assert_eq!(pace.amount(), 100);
         }
         pace.begin(0.0);

@@ -67,7 +67,6 @@ impl PhotonPaths {
         photons: &mut Array,
         readback: &mut Readback,
         timer: &mut Timer<N_STAGES>,
-        dispatch_seconds: f64,
     ) -> Result<u32, Error> {
         self.slots.reserve(context, u64::from(CHUNK * SLOTS))?;
         self.counters.reserve(context, u64::from(N_TOTALS + CHUNK + 2 * CHUNK / THREADS))?;
@@ -80,7 +79,7 @@ impl PhotonPaths {
         loop {
             self.rounds = self.rounds.min(most_rounds);
             let room = photons.capacity().min(u64::from(u32::MAX)) as u32;
-            self.record(context, shared, scene, frame, photons, room, timer, dispatch_seconds)?;
+            self.record(context, shared, scene, frame, photons, room, timer)?;
             let totals: Vec<u32> = readback.read(context, shared, self.counters.raw(), N_TOTALS as usize)?;
             let [n, _, unfinished, _] = totals[..] else { unreachable!("four words were asked for") };
             if unfinished > 0 && self.rounds < most_rounds {
@@ -106,7 +105,6 @@ impl PhotonPaths {
         photons: &Array,
         room: u32,
         timer: &mut Timer<N_STAGES>,
-        dispatch_seconds: f64,
     ) -> Result<(), Error> {
         let mut batch = Batch::new(context, shared, "photons");
         scene.set_frame(&batch, frame);
@@ -117,7 +115,7 @@ impl PhotonPaths {
         let mut begun = 0;
         for first in (0..frame.n_paths).step_by((CHUNK * PATHS) as usize) {
             if first > 0 {
-                self.pace.learn(batch.cut(std::mem::take(&mut begun))?, dispatch_seconds);
+                self.pace.learn(batch.cut(std::mem::take(&mut begun))?);
             }
             let n = (CHUNK * PATHS).min(frame.n_paths - first);
             let groups = n.div_ceil(THREADS * PATHS);
@@ -125,13 +123,13 @@ impl PhotonPaths {
             for round in 0..self.rounds {
                 if round > 0 {
                     let took = batch.cut_if_interruptible(std::mem::take(&mut begun))?;
-                    self.pace.learn(took, dispatch_seconds);
+                    self.pace.learn(took);
                 }
                 let buffers = [self.slots.all(), self.counters.all(), self.states.all()];
                 let mut group = 0;
                 while group < groups {
                     if group > 0 {
-                        self.pace.learn(batch.cut(std::mem::take(&mut begun))?, dispatch_seconds);
+                        self.pace.learn(batch.cut(std::mem::take(&mut begun))?);
                     }
                     let amount = self.pace.amount().max(FEWEST_GROUPS) * if round == 0 { 1 } else { LATER };
                     let part = amount.min(groups - group);

@@ -208,15 +208,18 @@ impl Viewer {
         if self.editing.is_some() {
             self.previous = self.wanted.scene.clone();
         }
-        self.wanted.scene = Some(Arc::new(Choice { name: name.into(), set: [set, self.always.clone()].concat() }));
-        (self.wanted.settings, self.wanted.reads_again) = (None, false);
-        self.wanted.limits_at_first = Some(self.limits.flags());
-        self.wanted.reloads += 1;
+        self.want(Some(Arc::new(Choice { name: name.into(), set: [set, self.always.clone()].concat() })));
     }
 
     /// Opens what was open before.
     pub fn back(&mut self) {
-        self.wanted.scene = self.previous.take();
+        let scene = self.previous.take();
+        self.want(scene);
+    }
+
+    /// A scene as its file has it.
+    fn want(&mut self, scene: Option<Arc<Choice>>) {
+        self.wanted.scene = scene;
         (self.wanted.settings, self.wanted.reads_again) = (None, false);
         self.wanted.limits_at_first = Some(self.limits.flags());
         self.wanted.reloads += 1;
@@ -308,8 +311,7 @@ impl Viewer {
 
     /// How the picture is shown.
     pub fn look(&self) -> Look {
-        let settings = self.edits.now();
-        Look { exposure: settings.exposure, tonemap: settings.tonemap.unwrap_or_default() }
+        Look::of(self.edits.now())
     }
 
     /// In a narrow window it gives way to the settings, so that the picture does not.
@@ -363,10 +365,10 @@ impl Viewer {
         let opened = self.editing.as_ref()?;
         let iterations = self.now.frame.as_ref().map_or(1, |frame| frame.film.n_iterations);
         let flags = self.engine.device_flags();
-        // It may be pasted anywhere.
-        let scene = Path::new(&opened.source.name);
-        let absolute = scene.exists().then(|| crate::scenes::absolute(scene).ok()).flatten();
-        let scene = absolute.as_ref().unwrap_or(&opened.source.name);
+        // It may be pasted anywhere. A shipped scene has no place.
+        let Source { name, canonical, .. } = &opened.source;
+        let absolute = canonical.as_ref().and_then(|_| crate::scenes::absolute(Path::new(name)).ok());
+        let scene = absolute.as_ref().unwrap_or(name);
         Some(opened.command(scene, self.edits.now(), flags, iterations, Path::new("picture.exr")))
     }
 
@@ -382,16 +384,12 @@ impl Viewer {
 
     /// Writes the picture to `path`, as it looks now.
     pub fn save_to(&mut self, path: PathBuf) {
-        let read = self.editing.as_ref().map(|opened| opened.source.check_not_read(self.edits.now(), &path));
-        match read {
-            Some(Err(Usage(why))) => self.engine.speaker()(Message::Error(why)),
-            _ => self.engine.save(self.saving_to(path)),
-        }
+        self.engine.save(self.saving_to(path));
     }
 
     /// The picture as it looks now, to be written to `path`.
     pub fn saving_to(&self, path: PathBuf) -> Save {
-        Save { path, look: self.look(), scene: self.wanted.scene.clone() }
+        Save { path, settings: Arc::clone(self.edits.now()), scene: self.wanted.scene.clone() }
     }
 
     /// How the picture would be saved now; with an empty path if nobody has said where. Kept right at every frame.

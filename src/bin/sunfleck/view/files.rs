@@ -389,7 +389,7 @@ pub fn name_of(path: &Path) -> Cow<'_, str> {
 }
 
 /// In `folder`, not there yet.
-fn free_name(folder: &Path, stem: &str, extension: &str) -> PathBuf {
+pub fn free_name(folder: &Path, stem: &str, extension: &str) -> PathBuf {
     let name = |i: u32| folder.join(format!("{stem}-{i}.{extension}"));
     (1..).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0))
 }

@@ -1,7 +1,7 @@
 //! The window of the system, and what may befall it.
 
 use std::panic::AssertUnwindSafe;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use std::{panic, thread};
@@ -12,6 +12,7 @@ use eframe::{egui, wgpu};
 use super::app::{LastSave, Viewer};
 use super::engine::{Message, Save, Wake, panic_text};
 use super::exit;
+use super::files::free_name;
 
 /// Where eframe keeps what is remembered, and what the window manager knows the window by.
 const APP_ID: &str = "sunfleck";
@@ -210,8 +211,7 @@ fn beside(path: PathBuf) -> PathBuf {
         return path;
     }
     let [stem, extension] = [path.file_stem(), path.extension()].map(|part| part.unwrap_or_default().to_string_lossy());
-    let name = |i: u32| path.with_file_name(format!("{stem}-rescued-{i}.{extension}"));
-    (1..).map(name).find(|path| !path.exists()).unwrap_or(path)
+    free_name(path.parent().unwrap_or(Path::new("")), &format!("{stem}-rescued"), &extension)
 }
 
 fn with_picture(why: anyhow::Error, saved: Option<PathBuf>) -> anyhow::Error {
@@ -254,6 +254,14 @@ impl<G: Guest> eframe::App for Window<'_, G> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_device_that_fails_again_and_again_is_given_up() {
+        let (mut faults, began) = (vec![], Instant::now());
+        let at = |seconds: u64| began + Duration::from_secs(seconds);
+        assert_eq!([0, 20, 40, 59].map(|s| is_often(&mut faults, at(s))), [false, false, false, true]);
+        assert_eq!([200, 300, 400, 500].map(|s| is_often(&mut faults, at(s))), [false; 4]);
+    }
 
     #[test]
     fn a_panic_is_told_in_one_line_and_names_whose_it_is() {

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use anyhow::Result;
 use sunfleck::output;
 use sunfleck::output::display::Look;
+use sunfleck::scene::settings::Settings;
 
 use super::{Board, Choice, Frame, Message, Phase, Shared, catch};
 use crate::{job, progress};
@@ -18,7 +19,8 @@ use crate::{job, progress};
 pub struct Save {
     /// `.exr` or `.png`.
     pub path: PathBuf,
-    pub look: Look,
+    /// As they are now, perhaps not of the film yet.
+    pub settings: Arc<Settings>,
     /// Whose picture it is.
     pub scene: Option<Arc<Choice>>,
 }
@@ -43,9 +45,10 @@ impl Save {
     /// Writes a film. Returns the number of its iterations.
     pub fn write(&self, frame: &Frame) -> Result<u32> {
         let (film, params, machine) = (&frame.film, &frame.params, &frame.machine);
+        frame.opened.source.check_not_read(&self.settings, &self.path)?;
         let picture = frame.picture();
         if job::is_png(&self.path) {
-            output::png::write(&self.path, &picture, &self.look)?;
+            output::png::write(&self.path, &picture, &Look::of(&self.settings))?;
         } else {
             let (opened, flags) = (&frame.opened, &machine.flags);
             let name = &opened.source.name;

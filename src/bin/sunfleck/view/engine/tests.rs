@@ -5,7 +5,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use sunfleck::cpu::CpuStages;
-use sunfleck::output::display::Look;
 use sunfleck::output::exr;
 use sunfleck::ppm::{self, Film, Stages};
 use sunfleck::scene::settings::{CameraSettings, Count, Index};
@@ -104,7 +103,7 @@ impl Bench {
     fn save(&self, path: &Path) -> Message {
         self.engine.take_messages();
         let scene = self.wanted.scene.clone();
-        self.engine.save(Save { path: path.to_owned(), look: Look::default(), scene });
+        self.engine.save(Save { path: path.to_owned(), settings: Arc::default(), scene });
         let mut said = vec![];
         self.wait("saving", |_| {
             said.extend(self.engine.take_messages());
@@ -197,7 +196,7 @@ fn a_picture_is_saved_while_the_render_thread_is_busy() {
     let left = bench.wanted.scene.clone();
     let other = folder.path().join("b.exr");
     bench.choose("glass", &["size=8x8", "photons=10"]);
-    let late = Save { path: other.clone(), look: Look::default(), scene: left };
+    let late = Save { path: other.clone(), settings: Arc::default(), scene: left };
     bench.engine.save(late);
     let said = |message: &Message, part| matches!(message, Message::Error(text) if text.contains(part));
     bench.wait("refusal", |_| bench.engine.take_messages().iter().any(|m| said(m, "b.exr was not written")));
@@ -217,7 +216,7 @@ fn a_preview_is_not_saved_for_the_picture() {
     bench.send();
     bench.wait("a preview", |now| now.frame.as_ref().is_some_and(|frame| frame.is_preview));
     let scene = bench.wanted.scene.clone();
-    bench.engine.save(Save { path: path.clone(), look: Look::default(), scene });
+    bench.engine.save(Save { path: path.clone(), settings: Arc::default(), scene });
     bench.wanted.moving = false;
     bench.send();
     bench.wait("saving", |_| path.exists());

@@ -262,15 +262,18 @@ impl Have {
     /// Publishes the film now and then; at once if it `is_last` for a while.
     fn show(&mut self, shared: &Shared, wanted: &Wanted, is_last: bool) -> Result<()> {
         let Some(session) = &mut self.session else { return Ok(()) };
-        let work = Work {
-            wanted: wanted.clone(),
-            opened: Arc::clone(&session.opened),
-            keep_on: wanted.moving && session.n_iterations == 1,
-        };
-        shared.redirect(|board| board.work = Some(work));
         let needs = shared.board().needs();
+        // The film alone is quick to have, and shown after every iteration.
+        let is_long = needs.is_any();
+        if is_long {
+            let (wanted, opened) = (wanted.clone(), Arc::clone(&session.opened));
+            let keep_on = wanted.moving && session.n_iterations == 1;
+            shared.redirect(|board| board.work = Some(Work { wanted, opened, keep_on }));
+        }
         let frame = session.frame_if_due(is_last, needs);
-        shared.redirect(|board| board.work = None);
+        if is_long {
+            shared.redirect(|board| board.work = None);
+        }
         let frame = match frame {
             Err(Error::Interrupted) => return Ok(()),
             frame => frame?,

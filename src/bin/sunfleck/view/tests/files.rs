@@ -65,6 +65,9 @@ fn an_environment_lights_the_scene_that_is_open() {
     window.drop_file(dropped.clone());
     window.wait("environment", |viewer| environment(viewer) == Some(&dropped));
     let lit = mean(&mut window);
+    // It is not written over.
+    window.viewer().save_to(dropped.clone());
+    window.wait_for_message("a sky.hdr is read and to be written");
     // What cannot be read changes nothing.
     window.drop_file(broken);
     window.wait_for_message("broken.hdr");
