@@ -110,7 +110,7 @@ struct SceneInfo {
     environment_height: u32,
     environment_rotation: vec2<f32>,
     epsilon: f32,
-    pad: u32,
+    environment_strength: f32,
 }
 
 struct Camera {

@@ -93,6 +93,11 @@ impl Stages for CpuStages {
         Ok(())
     }
 
+    fn set_scene(&mut self, scene: &Arc<PackedScene>) -> Result<(), Error> {
+        self.scene = Arc::clone(scene);
+        Ok(())
+    }
+
     fn set_interrupt(&mut self, interrupt: Interrupt) {
         self.interrupt = interrupt;
     }

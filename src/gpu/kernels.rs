@@ -159,6 +159,13 @@ impl Shared {
         Self { arguments, groups, interrupt: Interrupt::default(), queue }
     }
 
+    /// Other groups of the same layouts, from 2 on.
+    #[cfg(feature = "render")]
+    pub(super) fn set_groups(&mut self, further: impl IntoIterator<Item = Group>) {
+        self.groups.truncate(1);
+        self.groups.extend(further);
+    }
+
     fn queue(&self) -> MutexGuard<'_, Queue> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -1,7 +1,10 @@
 //! Where the CPU and the GPU meet: the stages of an iteration.
 
+use std::sync::Arc;
+
 pub use crate::device::{Error, Interrupt};
 use crate::layout::{Camera, EyeVertex, Frame, Photon};
+use crate::scene::PackedScene;
 
 use super::Film;
 
@@ -53,6 +56,9 @@ pub trait Stages {
     /// Another camera and film, pixels (width, height), for the same scene: [`super::start`] comes next, and then the film
     /// is that of stages made anew.
     fn set_camera(&mut self, camera: Camera, film_size: [u32; 2]) -> Result<(), Error>;
+
+    /// Another scene: [`Stages::set_camera`] comes next. What it shares with the last one stays where it is.
+    fn set_scene(&mut self, scene: &Arc<PackedScene>) -> Result<(), Error>;
 
     /// What ends a stage early from now on.
     fn set_interrupt(&mut self, interrupt: Interrupt);

@@ -221,6 +221,7 @@ fn not_negative(v: Vec3) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Arc;
 
     fn triangle() -> Scene {
         let mesh = Mesh {
@@ -229,18 +230,18 @@ mod tests {
             triangles: vec![[0, 1, 2]],
             ..Mesh::default()
         };
-        Scene { meshes: vec![mesh], materials: vec![Material::default()], ..Scene::default() }
+        Scene { meshes: vec![mesh.into()], materials: vec![Material::default()], ..Scene::default() }
     }
 
     #[test]
     fn names_object_and_field() {
         assert_eq!(triangle().check(), Ok(()));
         let mut scene = triangle();
-        scene.meshes[0].triangles[0][1] = 3;
+        Arc::make_mut(&mut scene.meshes[0]).triangles[0][1] = 3;
         let message = scene.check().unwrap_err().to_string();
         assert_eq!(message, r#"mesh "floor": triangles: triangle 0 is [0, 3, 2], but there are 3 vertices"#);
         let mut scene = triangle();
-        scene.meshes[0].uv0 = vec![glam::Vec2::ZERO];
+        Arc::make_mut(&mut scene.meshes[0]).uv0 = vec![glam::Vec2::ZERO];
         assert_eq!(scene.check().unwrap_err().place, r#"mesh "floor": uv0"#);
         let mut scene = triangle();
         scene.materials[0].roughness = f32::NAN;

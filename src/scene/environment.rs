@@ -25,8 +25,8 @@ impl Environment {
     }
 }
 
-/// Radiance with the cumulative probability within its row, cumulative probability of the rows, and mean luminance over
-/// the sphere. Radiance is interpolated bilinearly, so a texel's weight is the mean over its neighbours: nothing bright
+/// At strength 1: radiance with the cumulative probability within its row, cumulative probability of the rows, and mean
+/// luminance over the sphere. Radiance is interpolated bilinearly, so a texel's weight is the mean over its neighbours: nothing bright
 /// has density zero.
 pub(super) fn pack(e: &Environment) -> (Vec<[f32; 4]>, Vec<f32>, f32) {
     let (w, h) = (e.width as usize, e.height as usize);
@@ -60,7 +60,7 @@ pub(super) fn pack(e: &Environment) -> (Vec<[f32; 4]>, Vec<f32>, f32) {
             } else {
                 (x + 1) as f64 / w as f64
             };
-            let c = e.texels[y * w + x] * e.strength;
+            let c = e.texels[y * w + x];
             texels.push([c.x, c.y, c.z, cumulative as f32]);
         }
         total += row * solid_angle(y);
@@ -70,5 +70,5 @@ pub(super) fn pack(e: &Environment) -> (Vec<[f32; 4]>, Vec<f32>, f32) {
     if let Some(last) = rows.last_mut() {
         *last = 1.0;
     }
-    (texels, rows, (mean * f64::from(e.strength)) as f32)
+    (texels, rows, mean as f32)
 }

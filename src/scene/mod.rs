@@ -8,17 +8,18 @@ use std::sync::Arc;
 
 use glam::{Affine3A, Mat2, Vec2, Vec3, Vec4};
 
-/// Everything a picture is computed from. Plain data: [`Scene::check`] says whether it can be rendered.
+/// Everything a picture is computed from. Plain data: [`Scene::check`] says whether it can be rendered. What is large is shared: a
+/// clone costs little.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     /// Triangle meshes in world space.
-    pub meshes: Vec<Mesh>,
+    pub meshes: Vec<Arc<Mesh>>,
     /// Analytic spheres in world space.
     pub spheres: Vec<Sphere>,
     /// Materials, referred to by index.
     pub materials: Vec<Material>,
     /// Images, referred to by index from [`Texture`].
-    pub images: Vec<Image>,
+    pub images: Vec<Arc<Image>>,
     /// Point, spot and directional lights. Emissive materials make area lights by themselves.
     pub lights: Vec<PunctualLight>,
     /// Light from infinitely far away.
@@ -51,7 +52,7 @@ pub struct Mesh {
 }
 
 /// An analytic sphere; its front is outside.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
     /// Metres, world space.
     pub centre: Vec3,

@@ -51,14 +51,14 @@ fn same_picture(scene: &Scene, camera: &Camera) {
     assert_eq!(different, 0, "of {}", bvh.len());
 }
 
-fn quad(material: usize, corner: Vec3, u: Vec3, v: Vec3) -> Mesh {
-    Mesh {
+fn quad(material: usize, corner: Vec3, u: Vec3, v: Vec3) -> Arc<Mesh> {
+    Arc::new(Mesh {
         positions: vec![corner, corner + u, corner + u + v, corner + v],
         uv0: vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         material,
         ..Mesh::default()
-    }
+    })
 }
 
 fn lamp(position: Vec3) -> PunctualLight {
@@ -98,7 +98,13 @@ fn leaves() -> Scene {
         }
     }
     let image = Image { name: String::new(), width: 8, height: 8, texels };
-    Scene { meshes, materials, images: vec![image], lights: vec![lamp(Vec3::new(0.3, 4.0, 0.2))], ..Scene::default() }
+    Scene {
+        meshes,
+        materials,
+        images: vec![image.into()],
+        lights: vec![lamp(Vec3::new(0.3, 4.0, 0.2))],
+        ..Scene::default()
+    }
 }
 
 /// Glass balls over a floor, and balls that overlap.
@@ -194,7 +200,7 @@ fn a_scene_of_nothing_or_of_spheres_only_has_a_tree() {
 fn what_is_too_far_for_planes_is_refused() {
     let far = quad(0, Vec3::splat(1e20), Vec3::X * 1e19, Vec3::Y * 1e19);
     let packed =
-        PackedScene::new(&Scene { meshes: vec![far], materials: vec![Material::default()], ..Scene::default() });
+        PackedScene::new(&Scene { meshes: vec![far.into()], materials: vec![Material::default()], ..Scene::default() });
     assert_eq!(packed.accelerated(Accelerator::Kd).err(), Some(kd::Error::Vertex(0)));
 }
 

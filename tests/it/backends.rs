@@ -116,10 +116,10 @@ pub fn everything() -> Scene {
         kind,
     };
     Scene {
-        meshes,
+        meshes: meshes.into_iter().map(Arc::new).collect(),
         spheres,
         materials,
-        images: vec![noise_image("color", 13, 7), noise_image("normal", 8, 8)],
+        images: [noise_image("color", 13, 7), noise_image("normal", 8, 8)].map(Arc::new).into(),
         lights: vec![
             light(1.0, PunctualKind::Point),
             light(2.0, PunctualKind::Spot { inner: 0.2, outer: 0.5 }),
@@ -373,6 +373,72 @@ fn another_camera_is_as_good_as_new_stages_on_the_gpu() {
     });
 }
 
+/// Scenes that share more or less with the one before: each as by stages of its own. `film` is of those with the scene, made or
+/// set.
+fn scene_can_be_replaced(mut film: impl FnMut(&Arc<PackedScene>, layout::Camera, &Params, bool) -> Vec<u32>) {
+    let params = Params { n_paths: 4_000, ..Params::new(24, 16) };
+    let mut scene = everything();
+    let camera = scene.cameras[0].pack(24, 16);
+    let mut packed = Arc::new(PackedScene::new(&scene));
+    let mut before = film(&packed, camera, &params, false);
+    let changes: [fn(&mut Scene); 8] = [
+        |scene| scene.materials[0].base_color = Vec3::new(0.1, 0.2, 0.9),
+        |scene| scene.materials[3].emission = Vec3::splat(2.0),
+        |scene| scene.environment.as_mut().expect("it has one").strength = 0.5,
+        |scene| scene.environment = Some(Environment::uniform(Vec3::new(0.2, 0.4, 0.1))),
+        |scene| scene.images[0] = noise_image("larger", 40, 30).into(),
+        |scene| scene.spheres[2].radius = 0.7,
+        |scene| Arc::make_mut(&mut scene.meshes[1]).positions.iter_mut().for_each(|at| at.x -= 1.0),
+        |scene| scene.lights.clear(),
+    ];
+    for (i, change) in changes.into_iter().enumerate() {
+        change(&mut scene);
+        packed = Arc::new(PackedScene::new_after(&packed, &scene));
+        let set = film(&packed, camera, &params, true);
+        assert!(set == film(&Arc::new(PackedScene::new(&scene)), camera, &params, false), "change {i}");
+        assert!(set != before, "change {i} is not seen");
+        before = set;
+    }
+}
+
+#[test]
+fn another_scene_is_as_good_as_new_stages_on_the_cpu() {
+    let mut first = None;
+    scene_can_be_replaced(|packed, camera, params, set| {
+        let made = CpuStages::new(packed.clone(), camera, params.film_size());
+        replaced(&mut first, made, packed, params, set)
+    });
+}
+
+#[test]
+fn another_scene_is_as_good_as_new_stages_on_the_gpu() {
+    let Some(context) = context() else { return };
+    let mut first = None;
+    scene_can_be_replaced(|packed, camera, params, set| {
+        let made = GpuStages::new(context.clone(), packed, camera).expect("stages");
+        replaced(&mut first, made, packed, params, set)
+    });
+}
+
+/// The film of stages that were made with this scene, or of the `first` that were made, to which it is `set`.
+fn replaced<S: Stages>(
+    first: &mut Option<S>,
+    mut made: S,
+    packed: &Arc<PackedScene>,
+    params: &Params,
+    set: bool,
+) -> Vec<u32> {
+    match first {
+        Some(first) if set => {
+            first.set_scene(packed).expect("room");
+            first.set_camera(made.camera(), params.film_size()).expect("room");
+            film_bits(first, params)
+        }
+        Some(_) => film_bits(&mut made, params),
+        None => film_bits(first.insert(made), params),
+    }
+}
+
 #[test]
 fn textures_larger_than_a_binding_are_refused() {
     let Some(context) = context() else { return };
@@ -381,7 +447,8 @@ fn textures_larger_than_a_binding_are_refused() {
         println!("skipped: the adapter binds more than this test wants to allocate");
         return;
     }
-    let scene = PackedScene { texels: vec![0; n as usize], ..PackedScene::new(&everything()) };
+    let mut scene = PackedScene::new(&everything());
+    scene.texels = vec![0; n as usize].into();
     match GpuStages::new(context, &scene, Default::default()) {
         Err(Error::TooLarge { what, needed, .. }) => assert_eq!((what.as_str(), needed), ("texels", 4 * n)),
         Err(other) => panic!("{other}"),
@@ -485,7 +552,8 @@ fn the_bsdf_is_the_same_on_both() {
 fn cornell() -> Scene {
     let white = Material::diffuse("white", Vec3::splat(0.73));
     let red = Material::diffuse("red", Vec3::new(0.65, 0.05, 0.05));
-    let wall = |a: [f32; 3], b: [f32; 3], c: [f32; 3], d: [f32; 3], m| quad("wall", [a, b, c, d].map(Vec3::from), m);
+    let wall =
+        |a: [f32; 3], b: [f32; 3], c: [f32; 3], d: [f32; 3], m| Arc::new(quad("wall", [a, b, c, d].map(Vec3::from), m));
     Scene {
         meshes: vec![
             wall([-1., -1., 1.], [1., -1., 1.], [1., -1., -1.], [-1., -1., -1.], 0),

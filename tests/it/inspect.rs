@@ -35,7 +35,7 @@ fn ball(material: Material) -> Scene {
         kind: PunctualKind::Point,
     };
     Scene {
-        meshes: vec![floor(0.0, 0)],
+        meshes: vec![floor(0.0, 0).into()],
         spheres: vec![Sphere { centre: Vec3::Y, radius: 0.4, inward: false, material: 1 }],
         materials: vec![Material::diffuse("floor", Vec3::new(0.7, 0.6, 0.5)), material],
         lights: vec![light],

@@ -192,11 +192,11 @@ fn point_light_over_a_plane_with_the_bias_of_its_kernel() {
 fn plane(height: f32, intensity: f32) -> Scene {
     let corner = |x: f32, z: f32| Vec3::new(x * 5.0, 0.0, z * 5.0);
     Scene {
-        meshes: vec![Mesh {
+        meshes: vec![Arc::new(Mesh {
             positions: vec![corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0), corner(-1.0, -1.0)],
             triangles: vec![[0, 1, 2], [0, 2, 3]],
             ..Mesh::default()
-        }],
+        })],
         materials: vec![Material::diffuse("plane", Vec3::ONE)],
         lights: vec![point_light(Vec3::new(0.0, height, 0.0), intensity)],
         ..Scene::default()

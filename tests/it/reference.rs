@@ -67,12 +67,13 @@ fn read_scene(description: &Value) -> (Scene, Camera) {
             let (centre, radius) = (vector(&sphere["center"]), number(&sphere["radius"]));
             scene.spheres.push(Sphere { centre, radius, inward: false, material: index });
         } else {
-            scene.meshes.push(Mesh {
+            let mesh = Mesh {
                 positions: list(&mesh["vertices"]).map(vector).collect(),
                 triangles: list(&mesh["faces"]).map(|f| numbers(f).map(|i: f32| i as u32)).collect(),
                 material: index,
                 ..Mesh::default()
-            });
+            };
+            scene.meshes.push(mesh.into());
         }
     }
     for light in list(&description["lights"]) {

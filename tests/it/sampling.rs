@@ -478,8 +478,8 @@ fn light_samples_follow_their_density() {
     two_sided.double_sided = true;
     let lamps = Scene {
         meshes: vec![
-            quad(Vec3::new(-1.0, 2.0, -1.0), Vec3::new(2.0, 0.3, 0.0), Vec3::new(0.0, 0.0, 1.5), 0),
-            quad(Vec3::new(-2.0, -1.0, 1.0), Vec3::new(0.0, 1.5, 0.0), Vec3::new(1.5, 0.0, 1.0), 2),
+            quad(Vec3::new(-1.0, 2.0, -1.0), Vec3::new(2.0, 0.3, 0.0), Vec3::new(0.0, 0.0, 1.5), 0).into(),
+            quad(Vec3::new(-2.0, -1.0, 1.0), Vec3::new(0.0, 1.5, 0.0), Vec3::new(1.5, 0.0, 1.0), 2).into(),
         ],
         spheres: vec![Sphere { centre: Vec3::new(2.0, -1.0, -0.5), radius: 0.8, inward: false, material: 1 }],
         materials: vec![Material::emitter("", Vec3::splat(3.0)), Material::emitter("", Vec3::splat(2.0)), two_sided],

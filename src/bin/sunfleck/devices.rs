@@ -127,6 +127,13 @@ fn open_gpu(args: &DeviceArgs, is_hardware: bool, progress: &Progress) -> Result
     }
 }
 
+/// How this adapter searches as `settings` say.
+#[cfg(feature = "gpu")]
+fn method_for(context: &Context, settings: &Settings) -> Method {
+    let is_hardware = settings.index == Some(Index::Hardware) && context.info().ray_queries;
+    if is_hardware { Method::Hardware } else { Method::Tree }
+}
+
 /// The same adapter, opened once more.
 #[cfg(feature = "gpu")]
 fn reopened(context: &Context, method: Method) -> Result<Arc<Context>, sunfleck::ppm::Error> {
@@ -200,19 +207,28 @@ impl Device {
         index.into_iter().chain(accel).collect()
     }
 
+    /// Whether it need not be opened anew to search as `settings` say.
+    pub fn can_follow(&self, settings: &Settings) -> bool {
+        match self {
+            Self::Cpu(_) => true,
+            #[cfg(feature = "gpu")]
+            Self::Gpu { context, method, .. } => *method == method_for(context, settings),
+        }
+    }
+
     /// Searches as `settings` say from now on, by the default where it cannot; opened anew, if it must be.
     pub fn follow(&mut self, settings: &Settings) -> Result<()> {
+        let can_follow = self.can_follow(settings);
         match self {
             Self::Cpu(accelerator) => *accelerator = settings.accel.unwrap_or_default(),
             #[cfg(feature = "gpu")]
-            Self::Gpu { context, method, .. } => {
-                let is_hardware = settings.index == Some(Index::Hardware) && context.info().ray_queries;
-                let wanted = if is_hardware { Method::Hardware } else { Method::Tree };
-                if *method != wanted {
-                    *context = reopened(context, wanted).context("index")?;
-                    *method = wanted;
-                }
+            Self::Gpu { context, method, .. } if !can_follow => {
+                let wanted = method_for(context, settings);
+                *context = reopened(context, wanted).context("index")?;
+                *method = wanted;
             }
+            #[cfg(feature = "gpu")]
+            Self::Gpu { .. } => {}
         }
         Ok(())
     }
@@ -237,18 +253,15 @@ impl Device {
         }
     }
 
-    /// The scene as it is computed with. `before` is the same with other materials and lights, perhaps.
-    pub fn pack(&self, scene: &Scene, before: Option<&PackedScene>) -> Result<Arc<PackedScene>> {
-        let packed = match before {
-            Some(before) => PackedScene::new_after(before, scene),
-            None => PackedScene::new(scene),
-        };
+    /// The scene as it is computed with; what it has of the one before is shared ([`PackedScene::new_after`]).
+    pub fn pack(&self, scene: &Scene, before: &PackedScene) -> Result<Arc<PackedScene>> {
+        let packed = PackedScene::new_after(before, scene);
         Ok(Arc::new(packed.accelerated(self.accelerator()).context("accel: no kd-tree over this scene")?))
     }
 
     /// Takes the scene to the device.
     pub fn stages(&self, input: &Input) -> Result<Box<dyn Stages>> {
-        self.stages_of(self.pack(&input.scene, None)?, input)
+        self.stages_of(self.pack(&input.scene, &PackedScene::default())?, input)
     }
 
     /// The same with a scene of [`Device::pack`].

@@ -103,8 +103,8 @@ impl GpuStages {
 
     fn make(context: Arc<Context>, scene: &PackedScene, camera: Camera, method: Method) -> Result<Self, device::Error> {
         use Access::{Read, Write};
-        let (scene, groups) = SceneBuffers::new(&context, scene, &camera)?;
-        let shared = Shared::new(&context, groups);
+        let mut buffers = SceneBuffers::new(&context, &camera);
+        let shared = Shared::new(&context, buffers.set(&context, scene)?.into());
         let modules = Modules::new(&context, &shared);
         let trace_eye = modules.kernel("eye", "trace_eye", &[Write])?;
         let paths = PhotonPaths::new(&modules)?;
@@ -122,7 +122,7 @@ impl GpuStages {
         let mut stages = Self {
             context,
             shared,
-            scene,
+            scene: buffers,
             camera,
             trace_eye,
             paths,
@@ -277,6 +277,14 @@ impl Stages for GpuStages {
         self.n_iterations = 0;
         self.begin_paces();
         self.context.check()
+    }
+
+    fn set_scene(&mut self, scene: &Arc<PackedScene>) -> Result<(), Error> {
+        let context = Arc::clone(&self.context);
+        context.guarded(|| {
+            self.shared.set_groups(self.scene.set(&context, scene)?);
+            Ok(())
+        })
     }
 
     fn set_interrupt(&mut self, interrupt: Interrupt) {

@@ -1,5 +1,7 @@
 //! The packed scene on the device.
 
+use std::sync::{Arc, Weak};
+
 use bytemuck::{Pod, Zeroable};
 
 use crate::device::Error;
@@ -23,17 +25,63 @@ pub(super) struct Tables {
     has_extended: u32,
 }
 
-/// Buffers of a scene, which do not change, and the constants of the camera and the iteration, which do.
+/// Buffers of a scene, and the constants of the scene, the camera and the iteration.
 pub(super) struct SceneBuffers {
     frame: wgpu::Buffer,
     camera: wgpu::Buffer,
-    /// Kept for the memory they account for.
-    _arrays: [Array; 6],
+    info: wgpu::Buffer,
+    tables: wgpu::Buffer,
+    nodes: Uploaded<SceneNode>,
+    primitives: Uploaded<Primitive>,
+    vertices: Uploaded<Vertex>,
+    texels: Uploaded<u32>,
+    environment: Uploaded<[f32; 4]>,
+    table: Array,
+}
+
+/// An array of the scene on the device.
+struct Uploaded<T> {
+    array: Array,
+    /// What it is a copy of, only to tell whether another is this one.
+    of: Weak<Vec<T>>,
+}
+
+impl<T: Pod> Uploaded<T> {
+    fn new(what: &'static str) -> Self {
+        Self { array: Array::new::<T>(what), of: Weak::new() }
+    }
+
+    /// Makes it one of `values`, if it is not.
+    fn set(&mut self, context: &Context, values: &Arc<Vec<T>>) -> Result<(), Error> {
+        let of = Arc::downgrade(values);
+        if !self.of.ptr_eq(&of) {
+            self.of = Weak::new();
+            self.array.write(context, values)?;
+            self.of = of;
+        }
+        Ok(())
+    }
 }
 
 impl SceneBuffers {
-    /// The buffers, and the bind groups 2 and 3 of the kernels.
-    pub(super) fn new(context: &Context, scene: &PackedScene, camera: &Camera) -> Result<(Self, Vec<Group>), Error> {
+    /// Of nothing yet.
+    pub(super) fn new(context: &Context, camera: &Camera) -> Self {
+        Self {
+            frame: constant(context, "frame", &Frame::zeroed()),
+            camera: constant(context, "camera", camera),
+            info: constant(context, "scene", &SceneInfo::zeroed()),
+            tables: constant(context, "tables", &Tables::zeroed()),
+            nodes: Uploaded::new("scene tree"),
+            primitives: Uploaded::new("primitives"),
+            vertices: Uploaded::new("vertices"),
+            texels: Uploaded::new("texels"),
+            environment: Uploaded::new("environment"),
+            table: Array::new::<[u32; 4]>("materials and lights"),
+        }
+    }
+
+    /// Takes to the device what it has not, and returns the bind groups 2 and 3 of the kernels.
+    pub(super) fn set(&mut self, context: &Context, scene: &PackedScene) -> Result<[Group; 2], Error> {
         let mut table: Vec<[u32; 4]> = Vec::new();
         let mut append = |bytes: &[u8]| {
             let first = table.len() as u32;
@@ -51,33 +99,27 @@ impl SceneBuffers {
             albedo: append(bytemuck::cast_slice(&scene.albedo)),
             has_extended: u32::from(scene.lights.iter().any(|l| l.kind == LIGHT_AREA || l.kind == LIGHT_ENVIRONMENT)),
         };
-        let mut arrays = [
-            Array::new::<SceneNode>("scene tree"),
-            Array::new::<Primitive>("primitives"),
-            Array::new::<Vertex>("vertices"),
-            Array::new::<u32>("texels"),
-            Array::new::<[f32; 4]>("environment"),
-            Array::new::<[u32; 4]>("materials and lights"),
-        ];
-        arrays[0].write(context, &scene.nodes)?;
-        arrays[1].write(context, &scene.primitives)?;
-        arrays[2].write(context, &scene.vertices)?;
-        arrays[3].write(context, &scene.texels)?;
-        arrays[4].write(context, &scene.environment)?;
-        arrays[5].write(context, &table)?;
+        self.nodes.set(context, &scene.nodes)?;
+        self.primitives.set(context, &scene.primitives)?;
+        self.vertices.set(context, &scene.vertices)?;
+        self.texels.set(context, &scene.texels)?;
+        self.environment.set(context, &scene.environment)?;
+        self.table.write(context, &table)?;
+        context.queue.write_buffer(&self.info, 0, bytemuck::bytes_of(&scene.info));
+        context.queue.write_buffer(&self.tables, 0, bytemuck::bytes_of(&tables));
 
-        let uniforms = [
-            constant(context, "frame", &Frame::zeroed()),
-            constant(context, "camera", camera),
-            constant::<SceneInfo>(context, "scene", &scene.info),
-            constant(context, "tables", &tables),
+        let uniforms = [&self.frame, &self.camera, &self.info, &self.tables];
+        let constants = uniforms.map(|buffer| (uniform(buffer.size(), false), buffer.as_entire_binding()));
+        let arrays = [
+            &self.nodes.array,
+            &self.primitives.array,
+            &self.vertices.array,
+            &self.texels.array,
+            &self.environment.array,
+            &self.table,
         ];
-        let bindings = uniforms.each_ref().map(|buffer| (uniform(buffer.size(), false), buffer.as_entire_binding()));
-        let constants = Group::new(context, "constants", &bindings);
-        let bindings = arrays.each_ref().map(|array| (storage(Access::Read), array.all()));
-        let groups = vec![constants, Group::new(context, "scene", &bindings)];
-        let [frame, camera, ..] = uniforms;
-        Ok((Self { frame, camera, _arrays: arrays }, groups))
+        let arrays = arrays.map(|array| (storage(Access::Read), array.all()));
+        Ok([Group::new(context, "constants", &constants), Group::new(context, "scene", &arrays)])
     }
 
     /// Constants of this batch and those submitted after it.

@@ -166,6 +166,8 @@ fn bounding_sphere(scene: &Scene, more: &[Sphere], with_inward: bool) -> Option<
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Arc;
+
     use crate::scene::{Environment, Material, Mesh, Projection, PunctualKind, PunctualLight};
 
     #[test]
@@ -175,7 +177,7 @@ mod tests {
             .collect();
         let mesh = Mesh { positions, triangles: vec![[0, 1, 2], [3, 4, 5], [5, 6, 7]], ..Mesh::default() };
         let dome = Sphere { centre: Vec3::ZERO, radius: 1000.0, inward: true, material: 0 };
-        let scene = Scene { meshes: vec![mesh], spheres: vec![dome], ..Scene::default() };
+        let scene = Scene { meshes: vec![mesh.into()], spheres: vec![dome], ..Scene::default() };
         let camera = default_camera(&scene, &[]);
         let widest = widest(&camera, &scene.meshes[0].positions);
         // And it comes near: the scene is wider than high.
@@ -211,7 +213,7 @@ mod tests {
             lamp.triangles.iter_mut().for_each(|triangle| triangle.swap(0, 1));
         }
         let materials = vec![Material::default(), Material::emitter("lamp", Vec3::ONE)];
-        Scene { meshes: vec![walls, lamp], materials, ..Scene::default() }
+        Scene { meshes: vec![walls.into(), lamp.into()], materials, ..Scene::default() }
     }
 
     fn add_quad(mesh: &mut Mesh, corners: [Vec3; 4]) {
@@ -245,8 +247,8 @@ mod tests {
     #[test]
     fn a_wall_is_looked_at_from_its_lit_side() {
         let mut scene = room(Vec3::Z, Vec3::Y);
-        scene.meshes[0] = Mesh::default();
-        add_quad(&mut scene.meshes[0], SQUARE.map(|[x, y]| Vec3::new(x, y, 1.0)));
+        scene.meshes[0] = Arc::default();
+        add_quad(Arc::make_mut(&mut scene.meshes[0]), SQUARE.map(|[x, y]| Vec3::new(x, y, 1.0)));
         let [towards, up] = stands(&default_camera(&scene, &[]));
         assert!(towards.z < -0.8 && up.y > 0.9, "{towards} {up}");
     }
@@ -279,7 +281,7 @@ mod tests {
         same(&scene);
         // The lamp of a closed room is covered: there is nothing to be seen inside.
         let mut covered = closed_room(Vec3::Y);
-        add_quad(&mut covered.meshes[0], SQUARE.map(|[x, z]| Vec3::new(x, 0.9, z)));
+        add_quad(Arc::make_mut(&mut covered.meshes[0]), SQUARE.map(|[x, z]| Vec3::new(x, 0.9, z)));
         same(&covered);
         // A lamp that is off lights nothing.
         covered.meshes.truncate(1);
@@ -291,7 +293,7 @@ mod tests {
 
     fn closed_room(up: Vec3) -> Scene {
         let mut scene = room(Vec3::X, up);
-        add_quad(&mut scene.meshes[0], SQUARE.map(|[y, z]| Vec3::new(1.0, y, z)));
+        add_quad(Arc::make_mut(&mut scene.meshes[0]), SQUARE.map(|[y, z]| Vec3::new(1.0, y, z)));
         scene
     }
 
@@ -302,11 +304,11 @@ mod tests {
             let room = closed_room(up);
             let mut with_speck = room.clone();
             let speck = SQUARE.map(|[y, z]| Vec3::new(-1.01, -0.02 * y, 0.02 * z));
-            add_quad(&mut with_speck.meshes[1], speck);
+            add_quad(Arc::make_mut(&mut with_speck.meshes[1]), speck);
             let mut beside_dark = room.clone();
-            let mut dark = room.meshes[0].clone();
+            let mut dark = Mesh::clone(&room.meshes[0]);
             dark.positions.iter_mut().for_each(|p| p.x += 2.5);
-            beside_dark.meshes.push(dark);
+            beside_dark.meshes.push(dark.into());
             for scene in [room, with_speck, beside_dark] {
                 let camera = default_camera(&scene, &[]);
                 let at = Vec3::from(camera.world_from_camera.translation);

@@ -76,9 +76,9 @@ mod tests {
     fn the_sky_is_only_for_dark_scenes() {
         let mesh = Mesh { positions: vec![Vec3::ZERO; 3], triangles: vec![[0, 1, 2]], ..Mesh::default() };
         let materials = vec![Material::default(), Material::emitter("lamp", Vec3::ONE)];
-        let mut dark = Scene { meshes: vec![mesh], materials, ..Scene::default() };
+        let mut dark = Scene { meshes: vec![mesh.into()], materials, ..Scene::default() };
         let mut lit = dark.clone();
-        lit.meshes[0].material = 1;
+        Arc::make_mut(&mut lit.meshes[0]).material = 1;
         assert!(has_light(&lit));
         // A glowing display is no lamp, unless it is brighter than what a texture can hold.
         let mut display = lit.clone();

@@ -1,6 +1,7 @@
 //! The file says what the scene says.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::{Affine3A, Mat2, Quat, Vec2, Vec3, Vec4};
 
@@ -171,10 +172,10 @@ fn everything() -> Scene {
         aspect: Some(1.5),
     };
     Scene {
-        meshes: vec![mesh],
+        meshes: vec![mesh.into()],
         spheres: Vec::new(),
         materials: vec![material, Material::diffuse("plain", Vec3::splat(0.5))],
-        images: vec![image("opaque", 255), image("seen through", 40)],
+        images: vec![image("opaque", 255).into(), image("seen through", 40).into()],
         lights: vec![
             light(PunctualKind::Point),
             light(PunctualKind::Spot { inner: 0.25, outer: 0.5 }),
@@ -215,13 +216,13 @@ fn what_cannot_be_said_is_an_error() {
         Mat2::from_cols(Vec2::new(1.0, 0.0), Vec2::new(0.5, 1.0));
     assert!(matches!(glb_bytes(&sheared), Err(ExportError::ShearedTexture { .. })));
     let mut dangling = everything();
-    dangling.meshes[0].triangles[0][1] = 3;
+    Arc::make_mut(&mut dangling.meshes[0]).triangles[0][1] = 3;
     assert!(matches!(glb_bytes(&dangling), Err(ExportError::Dangling { .. })));
     let mut dangling = everything();
-    dangling.meshes[0].material = 2;
+    Arc::make_mut(&mut dangling.meshes[0]).material = 2;
     assert!(matches!(glb_bytes(&dangling), Err(ExportError::Dangling { .. })));
     let mut infinite = everything();
-    infinite.meshes[0].positions[1].x = f32::NAN;
+    Arc::make_mut(&mut infinite.meshes[0]).positions[1].x = f32::NAN;
     assert!(matches!(glb_bytes(&infinite), Err(ExportError::NotFinite { .. })));
     let nowhere = Path::new("no such folder/scene.glb");
     assert!(matches!(write_glb(&everything(), nowhere), Err(ExportError::Io { .. })));
@@ -259,7 +260,7 @@ fn committed_files_are_up_to_date() {
 fn nodes_have_names_of_their_own() {
     let mut scene = everything();
     scene.meshes.push(scene.meshes[0].clone());
-    scene.meshes[0].name = "parallel".into();
+    Arc::make_mut(&mut scene.meshes[0]).name = "parallel".into();
     let bytes = glb_bytes(&scene).expect("a scene that can be written");
     let length = u32::from_le_bytes([bytes[12], bytes[13], bytes[14], bytes[15]]) as usize;
     let document: Value = serde_json::from_slice(&bytes[20..20 + length]).expect("JSON");

@@ -9,6 +9,7 @@ use crate::math::polygon::triangulate;
 use crate::scene::{Material, Mesh, Scene};
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// Read at once, whoever does not want them any more.
 const LINES: usize = 4096;
@@ -264,6 +265,7 @@ impl<'a> Parser<'a> {
             return Err(self.source.format("has neither vertices nor faces: is this an OBJ file?"));
         }
         let (materials, images) = self.library.finish(self.source)?;
+        let images = images.into_iter().map(Arc::new).collect();
         let mut scene = Scene { materials, images, ..Scene::default() };
         let mut index_of: HashMap<String, usize> = HashMap::new();
         for (i, material) in scene.materials.iter().enumerate() {
@@ -318,7 +320,7 @@ impl<'a> Parser<'a> {
             }
             geometry::clean(&mut mesh, &place, self.warnings).map_err(|problem| self.source.invalid(place, problem))?;
             if !mesh.triangles.is_empty() {
-                scene.meshes.push(mesh);
+                scene.meshes.push(mesh.into());
             }
         }
         Ok(scene)

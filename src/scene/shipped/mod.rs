@@ -57,7 +57,7 @@ impl Builder {
 
     /// Adds an image; a use of it that shows it once every `size` metres.
     fn image(&mut self, image: Image, size: [f32; 2]) -> Texture {
-        self.scene.images.push(image);
+        self.scene.images.push(image.into());
         let mut texture = Texture::new(self.scene.images.len() - 1);
         texture.transform = glam::Mat2::from_diagonal(glam::Vec2::new(1.0 / size[0], 1.0 / size[1]));
         texture
@@ -72,7 +72,7 @@ impl Builder {
             || m.emission_texture.is_some()
             || m.transmission_texture.is_some();
         let shape = if textured { shape } else { shape.without_uvs() };
-        self.scene.meshes.push(shape.into_mesh(name, material));
+        self.scene.meshes.push(shape.into_mesh(name, material).into());
     }
 
     /// Adds a pinhole camera; `yfov` in degrees.

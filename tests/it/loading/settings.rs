@@ -4,6 +4,7 @@ use super::{Folder, Glb};
 use glam::Vec3;
 use std::f32::consts::PI;
 use std::path::Path;
+use std::sync::Arc;
 use sunfleck::scene::settings::{Count, FirstRadius, Index, Kernel, Settings, Size};
 use sunfleck::scene::{Accelerator, AlphaMode, Environment, Material, Projection, PunctualKind, Scene};
 
@@ -173,7 +174,7 @@ fn the_scenes_environment_is_changed() {
     assert_eq!((own.rotation, own.strength, own.texels[0], n_warnings), (PI, 3.0, Vec3::ONE, 0));
     scene.environment = None;
     scene.materials.push(Material::emitter("lamp", Vec3::ONE));
-    scene.meshes[0].material = scene.materials.len() - 1;
+    Arc::make_mut(&mut scene.meshes[0]).material = scene.materials.len() - 1;
     assert!(turned(&scene).unwrap_err().to_string().contains("environment: neither file nor color"));
 }
 

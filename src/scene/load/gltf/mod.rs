@@ -16,6 +16,7 @@ use crate::mesh::Mesh;
 use crate::scene::Scene;
 use buffers::Buffers;
 use document::Document;
+use std::sync::Arc;
 
 /// What a file may require: read, or of no consequence to a still picture.
 const SUPPORTED_EXTENSIONS: &[&str] = &[
@@ -58,7 +59,7 @@ pub(super) fn load(source: &Source, bytes: &[u8], warnings: &mut Warnings) -> Re
     let mut budget = Budget::new();
     primitive::load_all(source, &document, &buffers, nodes.placements, &mut scene, &mut budget, warnings)?;
     // Last, and several at a time: the costliest part of many files.
-    scene.images = images.decode(source)?;
+    scene.images = images.decode(source)?.into_iter().map(Arc::new).collect();
     Ok(scene)
 }
 

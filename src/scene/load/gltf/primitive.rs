@@ -71,7 +71,7 @@ pub(super) fn load_all(
                 geometry::clean(&mut world, &place, reader.warnings)
                     .map_err(|problem| source.invalid(place, problem))?;
                 if !world.triangles.is_empty() {
-                    scene.meshes.push(world);
+                    scene.meshes.push(world.into());
                 }
             }
         }

@@ -7,8 +7,12 @@ use std::thread::Builder;
 use anyhow::{Result, anyhow};
 use glam::Vec3;
 use sunfleck::ppm::Interrupt;
+use sunfleck::scene::PackedScene;
+use sunfleck::scene::load::Loaded;
 
 use super::{Board, Choice, Opened, Shared, catch};
+use crate::cli::InputArgs;
+use crate::job::{self, Input};
 use crate::scenes::Source;
 
 /// Threads that read, at most, those that were left among them: each holds a scene.
@@ -65,7 +69,7 @@ impl Reader {
     }
 }
 
-/// Reads a scene and the settings that lie beside it.
+/// Reads a scene and the settings that lie beside it, and builds its tree.
 pub fn open(choice: &Arc<Choice>, interrupt: &Interrupt) -> Result<Opened> {
     let mut source = Source::resolve(&choice.name)?;
     let read = source.settings.clone();
@@ -77,7 +81,16 @@ pub fn open(choice: &Arc<Choice>, interrupt: &Interrupt) -> Result<Opened> {
     let bounds = loaded.scene.bounds(&source.settings.added_spheres()).unwrap_or([-0.5, 0.5].map(Vec3::splat));
     let stands_at = loaded.scene.cameras.first().map(|camera| Vec3::from(camera.world_from_camera.translation));
     let is_inside = stands_at.is_some_and(|at| at.clamp(bounds[0], bounds[1]) == at);
-    Ok(Opened { choice: Arc::clone(choice), source, read, loaded, bounds, is_closed: !has_camera && is_inside })
+    let is_closed = !has_camera && is_inside;
+    let packed = pack(&source, &loaded);
+    Ok(Opened { choice: Arc::clone(choice), source, read, loaded, packed, bounds, is_closed })
+}
+
+/// Nothing of a scene that cannot be rendered as it is: whoever tries is told why.
+fn pack(source: &Source, loaded: &Loaded) -> PackedScene {
+    let input = job::prepare(source, &source.settings, loaded.clone(), &InputArgs::default()).ok();
+    let has_room = |input: &Input| job::check_scene_memory(&input.scene).is_ok();
+    input.filter(has_room).map_or_else(PackedScene::default, |input| PackedScene::new(&input.scene))
 }
 
 #[cfg(test)]

@@ -149,16 +149,15 @@ pub struct Session {
 }
 
 impl Session {
-    /// `before` is the same scene with other materials and lights, perhaps; `interrupt` ends stages.
+    /// `interrupt` ends stages.
     pub fn new(
         device: &Device,
         opened: Arc<Opened>,
         settings: Arc<Settings>,
         input: Input,
-        before: Option<&PackedScene>,
         interrupt: Interrupt,
     ) -> Result<Self> {
-        let scene = device.pack(&input.scene, before)?;
+        let scene = device.pack(&input.scene, &opened.packed)?;
         let mut stages = device.stages_of(Arc::clone(&scene), &input)?;
         stages.set_interrupt(interrupt);
         let params = input.params.clone();
@@ -185,9 +184,13 @@ impl Session {
         })
     }
 
-    /// What it renders; the memory of the device is given back.
-    pub fn into_scene(self) -> Arc<PackedScene> {
-        self.scene
+    /// The same scene changed by other settings; [`Session::restart`] comes next. What stays of it is neither packed nor taken to
+    /// the device again.
+    pub fn change(&mut self, device: &Device, settings: Arc<Settings>, input: Input) -> Result<()> {
+        self.scene = device.pack(&input.scene, &self.scene)?;
+        self.stages.set_scene(&self.scene)?;
+        (self.settings, self.input) = (settings, input);
+        Ok(())
     }
 
     /// Begins anew: another camera perhaps, other parameters, or a preview. `estimate` names it.
@@ -355,7 +358,7 @@ pub mod tests {
         let settings = opened.source.settings.clone();
         let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default()).unwrap();
         let device = Device::Cpu(Accelerator::Bvh);
-        let mut session = Session::new(&device, opened.into(), settings.into(), input, None, interrupt).unwrap();
+        let mut session = Session::new(&device, opened.into(), settings.into(), input, interrupt).unwrap();
         session.restart(1, false).unwrap();
         session.start().unwrap();
         session

@@ -160,11 +160,6 @@ impl Have {
         }
     }
 
-    /// Whether nobody wants the scene any more.
-    fn is_left(&self, board: &Board) -> bool {
-        board.quit || is_other_scene(&self.wanted, &board.wanted)
-    }
-
     /// Applies the settings, as far as possible to the scene that the device has.
     fn prepare(&mut self, shared: &Shared, device: &mut Device, wanted: &Wanted) -> Result<()> {
         let Some(opened) = self.opened.clone() else { return Ok(()) };
@@ -185,10 +180,6 @@ impl Have {
             }
             None => {
                 let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
-                if self.is_left(&shared.board()) {
-                    // What comes is long in a large scene, and nothing ends it.
-                    return Ok(());
-                }
                 let held = self.session.as_ref().map(|session| &session.input.params);
                 if held.is_none_or(|held| job::needs_more(&input.params, held)) {
                     job::check_memory(&input.params, held.filter(|_| on_host))?;
@@ -198,14 +189,17 @@ impl Have {
                     job::check_scene_memory(&input.scene).with_context(|| opened.source.name.clone())?;
                 }
                 shared.update(|board| board.phase = Phase::Preparing);
-                let before = self.session.take();
                 // What has been said of this scene is not said again at every change.
-                let is_new = |warning: &&String| before.as_ref().is_none_or(|b| !b.input.warnings.contains(warning));
+                let said = self.session.as_ref().map_or(&[][..], |session| &session.input.warnings);
+                let is_new = |warning: &&String| !said.contains(warning);
                 let warnings: Vec<_> = input.warnings.iter().filter(is_new).cloned().map(Message::Warning).collect();
-                let before = before.map(Session::into_scene); // Its memory first.
+                let before = self.session.take().filter(|_| device.can_follow(&settings));
                 device.follow(&settings)?;
-                let (settings, interrupt) = (Arc::new(settings), shared.interrupt());
-                let session = Session::new(device, opened, settings, input, before.as_deref(), interrupt)?;
+                let settings = Arc::new(settings);
+                let session = match before {
+                    Some(mut session) => session.change(device, settings, input).map(|()| session)?,
+                    None => Session::new(device, opened, settings, input, shared.interrupt())?,
+                };
                 shared.update(|board| {
                     board.messages.extend(warnings);
                     board.device.clone_from(&session.machine.device);
