@@ -173,6 +173,13 @@ struct EyeVertex {
 const EYE_GATHER: u32 = 1u;
 const EYE_GLOSSY: u32 = 2u;
 
+struct Reach {
+    distance: f32,
+    footprint: f32,
+}
+
+const REACHED: u32 = 10u;
+
 struct Photon {
     position: vec3<f32>,
     normal_and_segments: u32,

@@ -2,7 +2,7 @@
 // they fill, so that few points get that far. So that it is small from the beginning, the points that are next to
 // the query in Morton order come first.
 #import search
-#import morton_code
+#import rank
 
 @group(0) @binding(4) var<storage, read_write> found: array<u32>;
 // [query][k]
@@ -23,24 +23,6 @@ struct Visitor {
     seeds: vec2<u32>,
 }
 
-// Number of points before the query in Morton order.
-fn rank_of(centre: vec3<f32>, n_points: u32, n_levels: u32) -> u32 {
-    let all = boxes[level_of(n_levels - 1u).x];
-    let code = morton_code(centre, all.min, all.max);
-    var low = 0u;
-    var high = n_points;
-    while low < high {
-        let middle = low + (high - low) / 2u;
-        let other = morton_code(position_of(middle), all.min, all.max);
-        if other.y < code.y || (other.y == code.y && other.x < code.x) {
-            low = middle + 1u;
-        } else {
-            high = middle;
-        }
-    }
-    return low;
-}
-
 // further.z: k.
 fn begin(query: u32, centre: vec3<f32>, radius2: f32) -> Visitor {
     let n_points = arguments.further.x;
@@ -52,9 +34,9 @@ fn begin(query: u32, centre: vec3<f32>, radius2: f32) -> Visitor {
     if n_points == 0u || arguments.further.y == 0u {
         return visitor;
     }
-    let rank = rank_of(centre, n_points, arguments.further.y);
+    let rank = rank_of(centre, n_points, boxes[level_of(arguments.further.y - 1u).x]);
     let n = min(clamp(2u * k, 8u, 64u), n_points);
-    let first = min(max(rank, n / 2u) - n / 2u, n_points - n);
+    let first = first_around(rank, n, n_points);
     for (var i = 0u; i < n; i++) {
         // From the query's place outwards, to both sides in turn; around the end where there are no more on one.
         let step = select(i / 2u, n - (i + 1u) / 2u, (i & 1u) != 0u);

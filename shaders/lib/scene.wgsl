@@ -15,7 +15,6 @@ struct Tables {
     has_extended: u32,
 }
 
-@group(2) @binding(1) var<uniform> camera: Camera;
 @group(2) @binding(2) var<uniform> scene_info: SceneInfo;
 @group(2) @binding(3) var<uniform> tables: Tables;
 

@@ -17,8 +17,8 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::index::PointBvh;
-use crate::layout::{Camera, EyeVertex, Frame, Photon};
-use crate::ppm::{Error, Film, Interrupt, StageTimes, Stages, film};
+use crate::layout::{Camera, EyeVertex, Frame, Photon, Reach};
+use crate::ppm::{Error, Film, Interrupt, StageTimes, Stages, film, reaches};
 use crate::scene::PackedScene;
 
 /// Paths a task takes at once: enough to hide its cost, few enough to spread.
@@ -183,6 +183,11 @@ impl Stages for CpuStages {
         });
         self.times.accumulate = start.elapsed().as_secs_f64();
         Ok(())
+    }
+
+    fn reaches(&mut self, frame: &Frame, step: usize) -> Result<Vec<Reach>, Error> {
+        self.tree.rebuild(self.photons.len(), |i| self.photons[i].position.into());
+        reaches(frame, &self.camera, &self.vertices, &self.tree, step, &self.interrupt)
     }
 
     fn set_first_radii(&mut self, radii: &[f32]) -> Result<(), Error> {

@@ -22,6 +22,7 @@ const LIBRARY: &[(&str, &str)] = &[
     ("tree", include_str!("../../shaders/lib/tree.wgsl")),
     ("hardware", include_str!("../../shaders/lib/hardware.wgsl")),
     ("search", include_str!("../../shaders/lib/search.wgsl")),
+    ("rank", include_str!("../../shaders/lib/rank.wgsl")),
     ("morton_code", include_str!("../../shaders/lib/morton_code.wgsl")),
     ("photon_paths", include_str!("../../shaders/lib/photon_paths.wgsl")),
 ];
@@ -43,6 +44,7 @@ const MODULES: &[(&str, &str)] = &[
     ("neighbours", include_str!("../../shaders/neighbours.wgsl")),
     ("scan", include_str!("../../shaders/scan.wgsl")),
     ("nearest", include_str!("../../shaders/nearest.wgsl")),
+    ("reaches", include_str!("../../shaders/reaches.wgsl")),
     ("gather", include_str!("../../shaders/gather.wgsl")),
     ("accumulate", include_str!("../../shaders/accumulate.wgsl")),
 ];

@@ -10,7 +10,7 @@ pub mod stages;
 
 use crate::layout;
 pub use film::Film;
-pub use radius::{FirstRadii, RadiusSchedule, first_radii};
+pub use radius::{FirstRadii, RadiusSchedule, first_radii, reaches};
 pub use stages::{Error, Interrupt, StageTimes, Stages};
 
 /// Density estimation kernel over t = d/r, each with unit integral over the disc.
@@ -177,12 +177,11 @@ fn fixed(params: &Params, radius: f32) -> FirstRadii {
     FirstRadii::fixed(radius, width as usize * height as usize)
 }
 
-/// From the eye paths and photons of `frame`, which the stages have afterwards.
+/// From the eye paths and photons of `frame`, which the stages have afterwards, in whatever order.
 fn automatic<S: Stages + ?Sized>(stages: &mut S, frame: &layout::Frame, step: usize) -> Result<FirstRadii, Error> {
     stages.trace_eye(frame)?;
     stages.trace_photons(frame)?;
-    let (eye, photons) = (stages.eye_vertices()?, stages.photons()?);
-    first_radii(frame, &stages.camera(), &eye, &photons, step, stages.interrupt())
+    Ok(first_radii(&stages.reaches(frame, step)?, frame.width as usize))
 }
 
 /// One iteration: the algorithm on one screen.

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::device::{Error, Interrupt};
 use crate::index::{Nearest, PointBvh, RadiusSearch};
-use crate::layout::{Camera, EYE_GATHER, EyeVertex, Frame, Photon};
+use crate::layout::{Camera, EYE_GATHER, EyeVertex, Frame, REACHED, Reach};
 
 /// Knaus & Zwicker 2011, equation 15 and its product form: r²(i+1) = r²(i)·(i+α)/(i+1), so
 /// r²(i) = r²(1)·Γ(i+α)/(Γ(1+α)·i!).
@@ -40,13 +40,12 @@ fn ln_gamma(x: f64) -> f64 {
     (x - 0.5) * x.ln() - x + 0.5 * std::f64::consts::TAU.ln() + 1.0 / (12.0 * x) - 1.0 / (360.0 * x.powi(3))
 }
 
-/// Photons of the pilot that a first radius reaches. Fewer would only be noisier, more only blurrier: at equal photons
-/// the error changes little around ten.
-const REACHED: usize = 10;
 /// Where photons are rare, the radius stops at this many times its median.
 const MOST_OF_MEDIAN: f32 = 4.0;
 /// The radius is at least this share of the pixel's width on the surface: what is finer, the pixel blurs anyway.
 const LEAST_OF_PIXEL: f32 = 0.7;
+/// Pixels that the median is taken of.
+const SAMPLE: usize = 4096;
 
 /// First radius of each film pixel.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -98,35 +97,40 @@ impl FirstRadii {
 /// To the tenth nearest photon of a first pass, between a share of the pixel's footprint and a multiple of the picture's
 /// median. Where the pilot's path gathers nothing: the mean of the pixels around, or the median.
 ///
-/// One pixel of each square of `step` by `step` is searched around for all of them; 1: each for itself.
-pub fn first_radii(
+/// `reaches` are those of [`Stages::reaches`](super::Stages::reaches), of a film of that width.
+pub fn first_radii(reaches: &[Reach], width: usize) -> FirstRadii {
+    let gathers = |reach: &Reach| reach.distance >= 0.0;
+    let gathering = reaches.iter().map(gathers).collect();
+    let every = (reaches.len() / SAMPLE).max(1);
+    let is_known = |distance: &f32| (0.0..f32::MAX).contains(distance);
+    let mut sample: Vec<f32> = reaches.iter().step_by(every).map(|reach| reach.distance).filter(is_known).collect();
+    sample.sort_unstable_by(f32::total_cmp);
+    let Some(&median) = sample.get(sample.len() / 2) else {
+        return FirstRadii { each: vec![without_photons(reaches); reaches.len()], gathers: gathering };
+    };
+    let most = median * MOST_OF_MEDIAN;
+    let radius = |reach: &Reach| match gathers(reach) {
+        true => reach.distance.min(most).max(LEAST_OF_PIXEL * reach.footprint),
+        false => 0.0,
+    };
+    let mut each = reaches.par_iter().map(radius).collect::<Vec<_>>();
+    fill_gaps(&mut each, width, median);
+    FirstRadii { each, gathers: gathering }
+}
+
+/// [`Stages::reaches`](super::Stages::reaches) on the CPU, by a tree over the photons.
+pub fn reaches(
     frame: &Frame,
     camera: &Camera,
     eye: &[EyeVertex],
-    photons: &[Photon],
+    photons: &PointBvh,
     step: usize,
     interrupt: &Interrupt,
-) -> Result<FirstRadii, Error> {
-    let mut tree = PointBvh::default();
-    tree.rebuild(photons.len(), |i| photons[i].position.into());
-    let gathering = eye.iter().map(gathers).collect();
-    // A first look at some of the pixels bounds the search for all of them.
-    let every = (eye.len() / 4096).max(1);
-    let sample: Vec<&EyeVertex> = eye.iter().step_by(every).filter(|v| gathers(v)).collect();
-    let reach = |v: &EyeVertex, most: f32| {
-        let mut nearest = Nearest::new(REACHED);
-        tree.nearest(v.position.into(), most, &mut nearest);
-        nearest.kth().map(|last| last.distance2.sqrt())
-    };
-    let mut distances: Vec<f32> = sample.par_iter().filter_map(|v| reach(v, f32::INFINITY)).collect();
-    distances.sort_unstable_by(f32::total_cmp);
-    let Some(&median) = distances.get(distances.len() / 2) else {
-        return Ok(FirstRadii { each: vec![without_photons(frame, camera, eye); eye.len()], gathers: gathering });
-    };
-    let most = median * MOST_OF_MEDIAN;
-    let mut radii = vec![0.0; eye.len()];
+) -> Result<Vec<Reach>, Error> {
+    let mut reaches: Vec<Reach> =
+        eye.par_iter().map(|v| Reach { distance: -1.0, footprint: footprint(frame, camera, v) }).collect();
     let (width, step) = (frame.width as usize, step.max(1));
-    radii.par_chunks_mut(width * step).zip(eye.par_chunks(width * step)).try_for_each(|(radii, eye)| {
+    reaches.par_chunks_mut(width * step).zip(eye.par_chunks(width * step)).try_for_each(|(reaches, eye)| {
         interrupt.check()?;
         // A ball around the square to the left, grown by the way from there, holds the same ten photons.
         let mut last: Option<(Vec3, f32)> = None;
@@ -136,15 +140,16 @@ pub fn first_radii(
             let mut pixels = pixels.filter(|&i| gathers(&eye[i])).peekable();
             let Some(&first) = pixels.peek() else { continue };
             let position = Vec3::from(eye[first].position);
-            let bound = last.map_or(most, |(p, r)| most.min((r + p.distance(position)) * (1.0 + 1e-5)));
-            let reached = reach(&eye[first], bound).unwrap_or(bound);
-            last = Some((position, reached));
-            pixels.for_each(|i| radii[i] = reached.max(LEAST_OF_PIXEL * footprint(frame, camera, &eye[i])));
+            let bound = last.map_or(f32::MAX, |(p, r)| (r + p.distance(position)) * (1.0 + 1e-5)).min(f32::MAX);
+            let mut nearest = Nearest::new(REACHED as usize);
+            photons.nearest(position, bound, &mut nearest);
+            let distance = nearest.kth().map_or(bound, |last| last.distance2.sqrt());
+            last = Some((position, distance));
+            pixels.for_each(|i| reaches[i].distance = distance);
         }
         Ok::<_, Error>(())
     })?;
-    fill_gaps(&mut radii, width, median);
-    Ok(FirstRadii { each: radii, gathers: gathering })
+    Ok(reaches)
 }
 
 /// Width of a pixel where its eye path ended, as if that path had been straight; metres.
@@ -157,8 +162,8 @@ fn footprint(frame: &Frame, camera: &Camera, v: &EyeVertex) -> f32 {
 }
 
 /// No photon was stored: any radius gathers the same nothing, but it has to be one.
-fn without_photons(frame: &Frame, camera: &Camera, eye: &[EyeVertex]) -> f32 {
-    let widest = eye.iter().map(|v| footprint(frame, camera, v)).fold(0.0, f32::max);
+fn without_photons(reaches: &[Reach]) -> f32 {
+    let widest = reaches.iter().map(|reach| reach.footprint).fold(0.0, f32::max);
     if widest > 0.0 && widest.is_finite() { widest } else { 1.0 }
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 pub use crate::device::{Error, Interrupt};
-use crate::layout::{Camera, EyeVertex, Frame, Photon};
+use crate::layout::{Camera, EyeVertex, Frame, Photon, Reach};
 use crate::scene::PackedScene;
 
 use super::Film;
@@ -80,6 +80,10 @@ pub trait Stages {
 
     /// Adds the gathered radiance to the film.
     fn accumulate(&mut self, frame: &Frame) -> Result<(), Error>;
+
+    /// What the first radius of every film pixel is chosen from, `[h·w]`; the photons are in any order afterwards. One pixel of each
+    /// square of `step` by `step` may be searched around for all of them.
+    fn reaches(&mut self, frame: &Frame, step: usize) -> Result<Vec<Reach>, Error>;
 
     /// First radius of every film pixel, metres, `[h·w]`, row-major.
     fn set_first_radii(&mut self, radii: &[f32]) -> Result<(), Error>;

@@ -325,6 +325,38 @@ fn the_same_seed_gives_the_same_bits_on_the_gpu() {
     assert!(films[0] == films[1]);
 }
 
+/// The tenth nearest photon is as far away as brute force says, however many there are.
+#[test]
+fn first_radii_are_chosen_from_the_same_distances() {
+    let Some((mut cpu, mut gpu)) = backends(&everything()) else { return };
+    let frame = params().frame(0);
+    cpu.trace_eye(&frame).expect("eye paths");
+    cpu.trace_photons(&frame).expect("photons");
+    let (vertices, all) = (cpu.eye_vertices().expect("vertices"), cpu.photons().expect("photons"));
+    let one_place = vec![all[0]; 300];
+    let flat: Vec<Photon> = all.iter().map(|p| Photon { position: [p.position[0], 0.25, 0.0], ..*p }).collect();
+    gpu.set_eye_vertices(&vertices).expect("room");
+    for photons in [&all[..0], &all[..9], &all[..10], &all[..23], &one_place, &flat[..500], &all] {
+        let stages: [&mut dyn Stages; 2] = [&mut cpu, &mut gpu];
+        let [on_cpu, on_gpu] = stages.map(|stages| {
+            stages.set_photons(photons).expect("room");
+            stages.reaches(&frame, 1).expect("distances")
+        });
+        assert_eq!((on_cpu.len(), on_gpu.len()), (vertices.len(), vertices.len()));
+        for (a, b) in on_cpu.iter().zip(&on_gpu) {
+            assert!(close(&[a.distance], &[b.distance], 1e-5) && close(&[a.footprint], &[b.footprint], 1e-5));
+        }
+        for (vertex, reach) in vertices.iter().zip(&on_cpu).step_by(37) {
+            let from = Vec3::from(vertex.position);
+            let mut distances: Vec<f32> = photons.iter().map(|p| from.distance(p.position.into())).collect();
+            distances.sort_by(f32::total_cmp);
+            let tenth = distances.get(layout::REACHED as usize - 1).copied().unwrap_or(f32::MAX);
+            let expected = if vertex.flags & layout::EYE_GATHER != 0 { tenth } else { -1.0 };
+            assert!(close(&[reach.distance], &[expected], 1e-5), "{} photons: {reach:?}, {expected}", photons.len());
+        }
+    }
+}
+
 /// The bits of a film after two iterations.
 pub fn film_bits(stages: &mut dyn Stages, params: &Params) -> Vec<u32> {
     start(stages, params).expect("start");

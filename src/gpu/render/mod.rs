@@ -20,8 +20,9 @@ use super::index::{Index, Sorted};
 use super::kernels::{ACCELERATION_STRUCTURE, Access, Batch, Kernel, Modules, Shared};
 use super::timer::Timer;
 use crate::device;
-use crate::layout::{Camera, EyeVertex, Frame, Photon, PointBox};
-use crate::ppm::{Error, Film, Interrupt, StageTimes, Stages};
+use crate::index::PointBvh;
+use crate::layout::{Camera, EyeVertex, Frame, Photon, PointBox, Reach};
+use crate::ppm::{Error, Film, Interrupt, StageTimes, Stages, reaches};
 use crate::scene::PackedScene;
 
 /// Threads a workgroup.
@@ -59,6 +60,7 @@ pub struct GpuStages {
     index: Index,
     /// What searches instead of the index's tree; the photons are in its order all the same.
     hardware: Option<Hardware>,
+    find_reaches: Arc<Kernel>,
     gather: Arc<Kernel>,
     accumulate: Arc<Kernel>,
     eye_vertices: Array,
@@ -78,6 +80,7 @@ pub struct GpuStages {
     n_iterations: u32,
     /// In pixels.
     eye_pace: Pace,
+    reach_pace: Pace,
     gather_pace: Pace,
     /// A photon takes the device to sort, in each part of that; none before the first.
     photon_seconds: Option<f64>,
@@ -117,6 +120,7 @@ impl GpuStages {
                 (modules.kernel("gather_hardware", "gather", &bindings)?, Some(hardware))
             }
         };
+        let find_reaches = modules.kernel("reaches", "find_reaches", &[Read, Read, Read, Read, Write])?;
         let accumulate = modules.kernel("accumulate", "accumulate", &[Read, Write])?;
         let timer = Timer::new(&context);
         let mut stages = Self {
@@ -128,6 +132,7 @@ impl GpuStages {
             paths,
             index,
             hardware,
+            find_reaches,
             gather,
             accumulate,
             eye_vertices: Array::in_ranges::<EyeVertex>("eye vertices"),
@@ -144,6 +149,7 @@ impl GpuStages {
             film_size: [0, 0],
             n_iterations: 0,
             eye_pace: Pace::new(1, MOST_PIXELS),
+            reach_pace: Pace::new(1, MOST_PIXELS),
             gather_pace: Pace::new(1, MOST_PIXELS),
             photon_seconds: None,
             dispatch_seconds: DISPATCH_SECONDS,
@@ -162,7 +168,7 @@ impl GpuStages {
 
     /// Nothing is known of what is next.
     fn begin_paces(&mut self) {
-        for pace in [&mut self.eye_pace, &mut self.gather_pace, &mut self.paths.pace] {
+        for pace in [&mut self.eye_pace, &mut self.reach_pace, &mut self.gather_pace, &mut self.paths.pace] {
             pace.begin(self.dispatch_seconds);
         }
     }
@@ -422,6 +428,41 @@ impl Stages for GpuStages {
         self.film_size = [frame.width, frame.height];
         self.n_iterations = frame.iteration;
         Ok(())
+    }
+
+    fn reaches(&mut self, frame: &Frame, step: usize) -> Result<Vec<Reach>, Error> {
+        self.check_pixels(frame)?;
+        // Ray queries have one radius for all, and no order.
+        if self.hardware.is_some() {
+            let (eye, photons) = (self.eye_vertices()?, self.photons()?);
+            let mut tree = PointBvh::default();
+            tree.rebuild(photons.len(), |i| photons[i].position.into());
+            return reaches(frame, &self.camera, &eye, &tree, step, &self.shared.interrupt);
+        }
+        self.build_index(frame)?;
+        let mut reaches = Array::in_ranges::<Reach>("distances to photons");
+        reaches.reserve(&self.context, u64::from(self.n_pixels))?;
+        let mut batch = Batch::new(&self.context, &self.shared, "distances to photons");
+        self.scene.set_frame(&batch, frame);
+        let mut next = Rows::new(frame, 0, self.reach_pace.amount());
+        while let Some(rows) = next {
+            let buffers = [
+                rows.of(&self.eye_vertices),
+                self.photons.all(),
+                self.index.nodes.all(),
+                self.index.boxes.all(),
+                rows.of(&reaches),
+            ];
+            let n_levels = self.index.levels.len() as u32;
+            let arguments = self.index.arguments([rows.n, self.n_photons, n_levels, rows.skipped()]);
+            batch.dispatch(&self.find_reaches, &buffers, arguments, rows.workgroups());
+            if rows.end() < frame.height {
+                self.reach_pace.learn(batch.cut(rows.pixels())?);
+            }
+            next = Rows::new(frame, rows.end(), self.reach_pace.amount());
+        }
+        batch.submit()?;
+        Ok(self.readback.read(&self.context, &self.shared, reaches.raw(), self.n_pixels as usize)?)
     }
 
     fn set_first_radii(&mut self, radii: &[f32]) -> Result<(), Error> {
