@@ -18,11 +18,12 @@ use super::engine::{
 use super::files;
 use super::messages::Messages;
 use super::picture::PictureView;
-use super::state::{Edits, LimitsOfScenes, Remembered};
+use super::remembered::{Memory, Remembered};
+use super::state::{Edits, LimitsOfScenes};
 use crate::cli::{Usage, ViewArgs};
 use crate::scenes::Source;
 
-/// Key of what is remembered.
+/// Key of what is remembered, where it was in eframe's file.
 const REMEMBERED: &str = "remembered";
 /// Width of a window with panels on either side of the picture, points.
 const LEAST_FOR_BOTH: f32 = 720.0;
@@ -102,6 +103,8 @@ pub struct Viewer {
     pub now: Now,
     pub edits: Edits,
     pub remembered: Remembered,
+    /// Where that is kept.
+    memory: Option<Memory>,
     /// Whether it has been in a window.
     entered: bool,
     pub picture: PictureView,
@@ -152,6 +155,7 @@ impl Viewer {
             now,
             edits: Edits::default(),
             remembered: Remembered::default(),
+            memory: None,
             entered: false,
             picture: PictureView::default(),
             compare: Default::default(),
@@ -181,21 +185,20 @@ impl Viewer {
     }
 
     /// Comes into a window: the first one, or another after that was lost, which has none of the textures and a clock of
-    /// its own.
-    pub fn enter(&mut self, storage: Option<&dyn eframe::Storage>) {
+    /// its own. What is remembered is kept at `place`.
+    pub fn enter(&mut self, storage: Option<&dyn eframe::Storage>, place: Option<PathBuf>) {
         if !std::mem::replace(&mut self.entered, true) {
-            self.remembered = storage.and_then(|storage| eframe::get_value(storage, REMEMBERED)).unwrap_or_default();
+            let old = || storage.and_then(|storage| eframe::get_value(storage, REMEMBERED));
+            if let Some(place) = place {
+                let (remembered, memory) = Memory::open(place, old, self.engine.speaker());
+                (self.remembered, self.memory) = (remembered, Some(memory));
+            }
             return;
         }
         self.picture.forget();
         self.compare.forget();
         (self.start, self.timing, self.title) = (Default::default(), Default::default(), String::new());
         self.messages.repeat();
-    }
-
-    /// Keeps what is to be remembered.
-    pub fn save(&self, storage: &mut dyn eframe::Storage) {
-        eframe::set_value(storage, REMEMBERED, &self.remembered);
     }
 
     /// Opens a file, or a shipped scene by its name.
@@ -484,6 +487,9 @@ impl Viewer {
             self.timing.ask(began, self.now.estimate);
         }
         self.engine.want(&self.wanted);
+        if let Some(memory) = &mut self.memory {
+            memory.keep(&self.remembered);
+        }
         let last = self.saving_to(self.place().cloned().unwrap_or_default());
         *self.last_save.lock().unwrap_or_else(PoisonError::into_inner) = Some(last);
     }

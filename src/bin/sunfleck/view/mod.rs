@@ -20,6 +20,7 @@ pub mod measure;
 mod messages;
 mod offscreen;
 mod picture;
+mod remembered;
 mod settings;
 mod signals;
 mod start;

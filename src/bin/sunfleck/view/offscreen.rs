@@ -22,7 +22,7 @@ pub fn run(viewer: &mut Viewer, bell: &Bell, guest: &mut impl Guest, size: [u32;
     let mut canvas = Canvas::new(size)?;
     let context = egui::Context::default();
     bell.hang(&context);
-    viewer.enter(None);
+    viewer.enter(None, None);
     let (began, mut next) = (Instant::now(), Instant::now());
     let mut work = None;
     loop {

@@ -1,15 +1,11 @@
-//! What the window keeps: settings with undo, limits, and what is remembered from one run to the next.
+//! What the window keeps: settings with undo, and limits.
 
-use std::path::Path;
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
 use sunfleck::scene::settings::Settings;
 
 use super::engine::Limits;
 
-/// Files that are remembered.
-const MOST_RECENT: usize = 12;
 /// Steps that can be undone.
 const MOST_UNDONE: usize = 256;
 
@@ -132,33 +128,6 @@ impl LimitsOfScenes {
     }
 }
 
-/// From one run to the next.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Remembered {
-    /// The newest first.
-    pub recent: Vec<String>,
-    pub show_settings: bool,
-    pub show_inspect: bool,
-    pub show_convergence: bool,
-}
-
-impl Default for Remembered {
-    fn default() -> Self {
-        Self { recent: vec![], show_settings: true, show_inspect: true, show_convergence: false }
-    }
-}
-
-impl Remembered {
-    /// Puts a file first, which is named in full.
-    pub fn opened(&mut self, path: &Path) {
-        let path = path.to_string_lossy().into_owned();
-        self.recent.retain(|other| *other != path);
-        self.recent.insert(0, path);
-        self.recent.truncate(MOST_RECENT);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -209,15 +178,5 @@ mod tests {
         let alphas: Vec<_> =
             std::iter::from_fn(|| edits.can_undo().then(|| (edits.undo(), edits.now().alpha).1)).collect();
         assert_eq!(alphas, [Some(0.13), Some(0.1)]);
-    }
-
-    #[test]
-    fn recent_files_are_the_newest_first_and_once() {
-        let mut remembered = Remembered::default();
-        // None of them is there: the disk is not asked.
-        for name in ["/no/a.obj", "/no/b.obj", "/no/a.obj"] {
-            remembered.opened(Path::new(name));
-        }
-        assert_eq!(remembered.recent, ["/no/a.obj", "/no/b.obj"]);
     }
 }

@@ -13,8 +13,9 @@ use super::app::{LastSave, Viewer};
 use super::engine::{Message, Save, Wake, panic_text};
 use super::exit;
 use super::files::free_name;
+use super::remembered;
 
-/// Where eframe keeps what is remembered, and what the window manager knows the window by.
+/// The folder of what is remembered, and what the window manager knows the window by.
 const APP_ID: &str = "sunfleck";
 /// A device that fails before it has drawn so many is not opened again.
 pub const FEWEST_FRAMES: usize = 10;
@@ -120,10 +121,12 @@ pub fn run(
     loop {
         let (fault, mut n_frames) = (Fault::default(), 0);
         let shown = (&mut *viewer, &mut *guest, &mut n_frames);
+        let options = options();
+        let place = remembered::place(APP_ID, &options);
         let ended = quietly(|| {
             eframe::run_native(
                 APP_ID,
-                options(),
+                options,
                 Box::new(|creation| {
                     let (viewer, guest, n_frames) = shown;
                     bell.hang(&creation.egui_ctx);
@@ -131,7 +134,7 @@ pub fn run(
                         let context = creation.egui_ctx.clone();
                         fault.watch(&state.device, move || context.request_repaint());
                     }
-                    viewer.enter(creation.storage);
+                    viewer.enter(creation.storage, place);
                     Ok(Box::new(Window { viewer, guest, n_frames, fault: fault.clone() }))
                 }),
             )
@@ -244,10 +247,6 @@ impl<G: Guest> eframe::App for Window<'_, G> {
         let state = frame.wgpu_render_state();
         let device = state.map(|state| &state.device);
         self.guest.after_frame(self.viewer, ui, &Drawn { work: frame.info().cpu_usage, device });
-    }
-
-    fn save(&mut self, storage: &mut dyn eframe::Storage) {
-        self.viewer.save(storage);
     }
 }
 

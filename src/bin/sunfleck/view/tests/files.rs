@@ -29,6 +29,58 @@ fn files_dropped_at_once_are_each_taken_or_named() {
     });
 }
 
+/// What the window kept in eframe's file before it had its own.
+struct Old;
+
+impl eframe::Storage for Old {
+    fn get_string(&self, key: &str) -> Option<String> {
+        let text = "(recent:[\"/no/old.obj\"],show_settings:false,show_inspect:true,show_convergence:true)";
+        (key == "remembered").then(|| text.to_owned())
+    }
+
+    fn set_string(&mut self, _: &str, _: String) {}
+
+    fn remove_string(&mut self, _: &str) {}
+
+    fn flush(&mut self) {}
+}
+
+#[test]
+fn what_is_remembered_is_in_a_file_as_soon_as_it_changes() {
+    let mut window = Window::new(None);
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path().join("remembered.toml");
+    let [scene, other] = ["quad.obj", "other.obj"].map(|name| folder.path().join(name));
+    for file in [&scene, &other] {
+        std::fs::write(file, QUAD).unwrap();
+    }
+    let full = |path: &Path| std::fs::canonicalize(path).unwrap().to_string_lossy().into_owned();
+    let there = |place: &Path| std::fs::read_to_string(place).unwrap_or_default().parse::<toml::Table>().unwrap();
+    let recent = |place: &Path, paths: &[String]| {
+        let paths: Vec<_> = paths.iter().cloned().map(toml::Value::String).collect();
+        there(place).get("recent").and_then(toml::Value::as_array) == Some(&paths)
+    };
+    window.viewer().enter(Some(&Old), Some(place.clone()));
+    let old = "/no/old.obj".to_owned();
+    window.wait("what was in the old file", |viewer| {
+        viewer.remembered.show_convergence && recent(&place, std::slice::from_ref(&old))
+    });
+    window.viewer().open(scene.to_string_lossy());
+    window.wait("the scene", |_| recent(&place, &[full(&scene), old.clone()]));
+    window.press(Modifiers::NONE, Key::F1);
+    window.wait("the panel", |_| there(&place).get("show_settings") == Some(&true.into()));
+    // Another window: the old file does not count any more.
+    let mut second = Window::new(None);
+    second.viewer().enter(Some(&Old), Some(place.clone()));
+    assert!(second.viewer().remembered.show_settings);
+    second.viewer().open(other.to_string_lossy());
+    second.wait("the other scene", |_| recent(&place, &[full(&other), full(&scene), old.clone()]));
+    second.press(Modifiers::NONE, Key::F2);
+    drop(window);
+    drop(second);
+    assert_eq!(there(&place).get("show_inspect"), Some(&false.into()));
+}
+
 /// Writes a sky of one radiance.
 fn write_sky(path: &Path, radiance: f32) {
     write_environment_hdr(&Environment::uniform(glam::Vec3::splat(radiance)), path).unwrap();

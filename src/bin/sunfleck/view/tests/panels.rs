@@ -199,31 +199,6 @@ fn a_reference_that_does_not_fit_is_told() {
     assert_eq!(window.viewer().wanted.painting.comparison, Comparison::Off);
 }
 
-#[test]
-fn the_panels_come_back() {
-    #[derive(Default)]
-    struct Kept(std::collections::HashMap<String, String>);
-    impl eframe::Storage for Kept {
-        fn get_string(&self, key: &str) -> Option<String> {
-            self.0.get(key).cloned()
-        }
-        fn set_string(&mut self, key: &str, value: String) {
-            self.0.insert(key.to_owned(), value);
-        }
-        fn remove_string(&mut self, key: &str) {
-            self.0.remove(key);
-        }
-        fn flush(&mut self) {}
-    }
-    let mut window = Window::new(None);
-    window.viewer().remembered.show_convergence = true;
-    let mut kept = Kept::default();
-    window.viewer().save(&mut kept);
-    let mut viewer = Viewer::new(super::engine(), Arc::new(|| {}), First::default());
-    viewer.enter(Some(&kept));
-    assert!(viewer.remembered.show_convergence);
-}
-
 /// Each control of the settings changes them, or how the picture is shown.
 #[test]
 fn every_control_of_the_settings_does_something() {

@@ -10,7 +10,7 @@ use super::{ITERATIONS, Window};
 use crate::view::engine::{Choice, Phase, Wanted};
 use crate::view::files::Purpose;
 use crate::view::keys::SHORTCUTS;
-use crate::view::state::Remembered;
+use crate::view::remembered::Remembered;
 
 /// What a shortcut may change.
 #[derive(Clone, Debug, PartialEq)]

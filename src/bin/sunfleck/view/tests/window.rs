@@ -179,6 +179,7 @@ fn loses_its_device() {
     window::run(&mut viewer, &bell, options, &mut onlooker).unwrap();
     assert!(matches!(viewer.now.phase, Phase::Failed(_)) && viewer.picture.painted().is_some());
     viewer.retry();
+    viewer.remembered.show_convergence = true;
     window::run(&mut viewer, &bell, options, &mut look_on(None, onlooker.estimate)).unwrap();
 
     // The window's, twice: what was rendered is kept, and grows.
@@ -204,4 +205,9 @@ fn loses_its_device() {
     let error = window::run(&mut viewer, &bell, options, &mut Vandal::new(When::InFrame, usize::MAX, 1)).unwrap_err();
     assert!(crate::chain(&error).contains("rescued.exr"), "{error:#}");
     assert_eq!(sunfleck::output::exr::read(&rescued).unwrap().size, [32, 24]);
+
+    // What is remembered is where eframe was told to keep its own.
+    drop(viewer);
+    let remembered = std::fs::read_to_string(folder.path().join("remembered.toml")).unwrap();
+    assert!(remembered.contains("show_convergence = true"), "{remembered}");
 }
