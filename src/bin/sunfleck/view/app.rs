@@ -198,6 +198,8 @@ impl Viewer {
         self.picture.forget();
         self.compare.forget();
         (self.start, self.timing, self.title) = (Default::default(), Default::default(), String::new());
+        // It sees no key let go that is held now.
+        self.keyboard = Default::default();
         self.messages.repeat();
     }
 

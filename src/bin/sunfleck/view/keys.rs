@@ -1,6 +1,7 @@
 //! Keyboard shortcuts: one table, from which the help is made.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use eframe::egui;
 use egui::{Key, KeyboardShortcut, Modifiers};
@@ -83,12 +84,20 @@ fn scale_photons(ui: &egui::Ui, viewer: &mut Viewer, factor: f64) {
     });
 }
 
+/// A key that is down.
+struct Held {
+    /// By its name in the layout of the keyboard.
+    letter: Key,
+    /// With Ctrl or Alt: it does not move the camera though these are let go first.
+    is_modified: bool,
+}
+
 /// What keys did in the frames before.
 #[derive(Default)]
 pub struct Keyboard {
-    /// Keys as they lie under the fingers. Of a sign that needs Shift egui never sees the end, if Shift is let go first: the
-    /// key has another name then.
-    held: BTreeSet<Key>,
+    /// Keys as they lie under the fingers, by their names on a US keyboard; by their own where the system does not tell. Of a
+    /// sign that needs Shift egui never sees the end, if Shift is let go first: the key has another name then.
+    held: BTreeMap<Key, Held>,
     /// Whether a field, a button or the like had the keys in the frame before.
     had_focus: bool,
     /// Whether it was left by Escape then.
@@ -96,10 +105,16 @@ pub struct Keyboard {
 }
 
 impl Keyboard {
-    /// Takes an event in; whether it is more than the repetition of a press.
-    fn take(&mut self, event: &egui::Event) -> bool {
+    /// Takes an event in; whether it is more than the repetition of a press. Ctrl and Alt make it no shortcut while `flying`.
+    fn take(&mut self, event: &egui::Event, flying: bool) -> bool {
         match event {
-            egui::Event::Key { key, physical_key, pressed: true, .. } => self.held.insert(physical_key.unwrap_or(*key)),
+            egui::Event::Key { key, physical_key, pressed: true, modifiers, .. } => {
+                let is_modified = !flying && (modifiers.command || modifiers.alt);
+                let place = self.held.entry(physical_key.unwrap_or(*key));
+                let is_new = matches!(place, Entry::Vacant(_));
+                place.or_insert(Held { letter: *key, is_modified });
+                is_new
+            }
             egui::Event::Key { key, physical_key, pressed: false, .. } => {
                 self.held.remove(&physical_key.unwrap_or(*key));
                 true
@@ -114,7 +129,18 @@ impl Keyboard {
 
     /// Whether no key is held but these.
     pub fn holds_only(&self, keys: &[Key]) -> bool {
-        self.held.iter().all(|key| keys.contains(key))
+        self.held.keys().all(|key| keys.contains(key))
+    }
+
+    /// Whether the key at a place of a US keyboard is held, to fly.
+    pub fn flies(&self, place: Key) -> bool {
+        self.held.get(&place).is_some_and(|key| !key.is_modified)
+    }
+
+    /// Whether it begins a flight: not by a letter that is a shortcut by itself, as E is, which lies at D on some keyboards.
+    pub fn begins_flight(&self, place: Key) -> bool {
+        let is_shortcut = |letter| SHORTCUTS.iter().any(|s| s.keys.logical_key == letter && !s.keys.modifiers.command);
+        self.flies(place) && !is_shortcut(self.held[&place].letter)
     }
 }
 
@@ -128,17 +154,11 @@ pub fn handle(ui: &mut egui::Ui, viewer: &mut Viewer) {
     // In the next frame, too: there a number field of egui 0.37 still counts as just left, and would take what was typed.
     let escaped_before = std::mem::replace(&mut viewer.keyboard.escaped, escaped);
     let escapes = !had_focus && !escaped_before && !egui::Popup::is_any_open(ui.ctx());
-    let modified = |event: &egui::Event| match event {
-        egui::Event::Key { key, pressed: true, modifiers, .. } if modifiers.command || modifiers.alt => Some(*key),
-        _ => None,
-    };
-    if !typing && !viewer.picture.flying && !ui.input(|i| i.pointer.secondary_down()) {
-        ui.input(|i| viewer.picture.not_flying.extend(i.events.iter().filter_map(modified)));
-    }
+    let flying = typing || viewer.picture.flying || ui.input(|i| i.pointer.secondary_down());
     // In a field, and with Ctrl, undo among it, a held key does again what it does.
     let repeats =
         |event: &egui::Event| typing || matches!(event, egui::Event::Key { modifiers, .. } if modifiers.command);
-    ui.input_mut(|i| i.events.retain(|event| viewer.keyboard.take(event) || repeats(event)));
+    ui.input_mut(|i| i.events.retain(|event| viewer.keyboard.take(event, flying) || repeats(event)));
     if escaped_before {
         let (key, modifiers) = (Key::Escape, Modifiers::NONE);
         let again = egui::Event::Key { key, physical_key: None, pressed: true, repeat: true, modifiers };
@@ -147,7 +167,7 @@ pub fn handle(ui: &mut egui::Ui, viewer: &mut Viewer) {
     if typing {
         return;
     }
-    if ui.input(|i| viewer.picture.flies(i)) {
+    if ui.input(|i| viewer.picture.flies(i, &viewer.keyboard)) {
         // Ctrl is for the pace; egui itself would quit.
         let is_modified =
             |event: &egui::Event| matches!(event, egui::Event::Key { modifiers, .. } if modifiers.command);

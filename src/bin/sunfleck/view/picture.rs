@@ -14,6 +14,7 @@ use super::app::Viewer;
 use super::camera::{Pace, Rig};
 use super::charts::short;
 use super::engine::{Painted, Phase};
+use super::keys::Keyboard;
 
 /// Radians an orbit turns over the picture's height.
 const ORBIT: f32 = 3.0;
@@ -42,8 +43,6 @@ pub struct PictureView {
     moved: Option<f64>,
     /// Whether keys move the camera, or did so since Ctrl is held: Ctrl makes it slow, and none of its keys a shortcut.
     pub flying: bool,
-    /// Keys that were pressed with Ctrl or Alt: they do not move the camera though the modifier is let go first.
-    pub not_flying: Vec<Key>,
     /// Pixel under the cursor.
     pub hovered: Option<[usize; 2]>,
     /// Where the picture is, points.
@@ -53,12 +52,11 @@ pub struct PictureView {
 }
 
 impl PictureView {
-    /// Whether keys are for flying.
-    pub fn flies(&self, input: &egui::InputState) -> bool {
-        let level = [Key::W, Key::A, Key::S, Key::D];
-        let starts = || level.iter().any(|key| input.key_down(*key) && !self.not_flying.contains(key));
+    /// Whether keys are for flying, by where they lie; else they are shortcuts, by their letters.
+    pub fn flies(&self, input: &egui::InputState, keyboard: &Keyboard) -> bool {
+        let begins = || [Key::W, Key::A, Key::S, Key::D].into_iter().any(|place| keyboard.begins_flight(place));
         let is_modified = input.modifiers.command || input.modifiers.alt;
-        self.flying || input.pointer.secondary_down() || !is_modified && starts()
+        self.flying || input.pointer.secondary_down() || !is_modified && begins()
     }
 
     /// What is on the screen.
@@ -303,8 +301,8 @@ fn move_camera(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, response: &egui::
     }
     let typing = ui.ctx().text_edit_focused();
     let was_flying = viewer.picture.flying;
-    let not_flying = &mut viewer.picture.not_flying;
-    let direction = if typing { Vec3::ZERO } else { ui.input(|i| flight(i, was_flying, not_flying)) };
+    let flies = !typing && ui.input(|i| !i.modifiers.alt && viewer.picture.flies(i, &viewer.keyboard));
+    let direction = if flies { flight(&viewer.keyboard) } else { Vec3::ZERO };
     viewer.picture.flying = direction != Vec3::ZERO || was_flying && command;
     if direction != Vec3::ZERO {
         let (pace, seconds) = ui.input(|i| {
@@ -327,22 +325,10 @@ fn move_camera(ui: &egui::Ui, viewer: &mut Viewer, area: Rect, response: &egui::
     }
 }
 
-/// x to the right, y up, z forward. Keys with Ctrl are shortcuts, and E alone is one, unless the camera flies already;
-/// those in `not` are left out until they are let go.
-fn flight(input: &egui::InputState, flying: bool, not: &mut Vec<Key>) -> Vec3 {
-    not.retain(|key| input.key_down(*key));
-    let free = flying || input.pointer.secondary_down();
-    if input.modifiers.alt || input.modifiers.command && !free {
-        return Vec3::ZERO;
-    }
-    let level = axis(input, not, Key::D, Key::A) * Vec3::X + axis(input, not, Key::W, Key::S) * Vec3::Z;
-    let rises = free || level != Vec3::ZERO;
-    level + if rises { axis(input, not, Key::E, Key::Q) * Vec3::Y } else { Vec3::ZERO }
-}
-
-fn axis(input: &egui::InputState, not: &[Key], plus: Key, minus: Key) -> f32 {
-    let down = |key: Key| f32::from(input.key_down(key) && !not.contains(&key));
-    down(plus) - down(minus)
+/// x to the right, y up, z forward.
+fn flight(keyboard: &Keyboard) -> Vec3 {
+    let axis = |plus, minus| f32::from(keyboard.flies(plus)) - f32::from(keyboard.flies(minus));
+    Vec3::new(axis(Key::D, Key::A), axis(Key::E, Key::Q), axis(Key::W, Key::S))
 }
 
 impl Viewer {

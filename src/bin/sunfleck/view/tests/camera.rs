@@ -146,3 +146,102 @@ fn letters_fly() {
     window.press(Modifiers::NONE, Key::A);
     assert_ne!(window.viewer().edits.now().camera, before);
 }
+
+/// Letter, and the name of its place on a US keyboard; down for some frames. How far the camera went: right, up, forward.
+fn hold(window: &mut Window, keys: &[(Key, Key)], modifiers: Modifiers) -> glam::Vec3 {
+    let from = window.viewer().camera().unwrap().world_from_camera;
+    let event = |&(key, place): &(Key, Key), pressed| Event::Key {
+        key,
+        physical_key: Some(place),
+        pressed,
+        repeat: false,
+        modifiers,
+    };
+    window.harness.input_mut().events.push(Event::ModifiersChanged(modifiers));
+    // One after the other, as fingers do.
+    for key in keys {
+        window.harness.input_mut().events.push(event(key, true));
+        window.steps(2);
+    }
+    window.steps(3);
+    window.harness.input_mut().events.extend(keys.iter().map(|key| event(key, false)));
+    window.harness.input_mut().events.push(Event::ModifiersChanged(Modifiers::NONE));
+    window.steps(2);
+    let to = window.viewer().camera().unwrap().world_from_camera;
+    let [x, y, z] = from.inverse().transform_point3(to.translation.into()).to_array();
+    glam::Vec3::new(x, y, -z)
+}
+
+/// What a key is called does not matter; where the system does not tell where it lies, its name does, as above.
+#[test]
+fn keys_fly_by_where_they_lie() {
+    let mut window = bare();
+    // AZERTY, Dvorak, the Turkish F.
+    for (letter, place, to) in [
+        (Key::Z, Key::W, glam::Vec3::Z),
+        (Key::Q, Key::A, -glam::Vec3::X),
+        (Key::O, Key::S, -glam::Vec3::Z),
+        (Key::Comma, Key::W, glam::Vec3::Z),
+        (Key::I, Key::S, -glam::Vec3::Z),
+    ] {
+        for modifiers in [Modifiers::NONE, Modifiers::SHIFT] {
+            let moved = hold(&mut window, &[(letter, place)], modifiers);
+            assert!(moved.normalize_or_zero().abs_diff_eq(to, 1e-3), "{letter:?} at {place:?}: {moved}");
+        }
+    }
+    for (letter, place) in [(Key::W, Key::Z), (Key::A, Key::Q), (Key::W, Key::Comma), (Key::S, Key::Semicolon)] {
+        assert_eq!(hold(&mut window, &[(letter, place)], Modifiers::NONE), glam::Vec3::ZERO, "{letter:?} at {place:?}");
+    }
+    // With Ctrl the letter counts: undo takes the flights back, and flies nowhere though Ctrl is let go first.
+    let command = Modifiers::COMMAND | Modifiers::CTRL;
+    let before = window.viewer().edits.now().camera.clone();
+    let event =
+        |pressed, modifiers| Event::Key { key: Key::Z, physical_key: Some(Key::W), pressed, repeat: false, modifiers };
+    let down = [Event::ModifiersChanged(command), event(true, command), Event::ModifiersChanged(Modifiers::NONE)];
+    window.harness.input_mut().events.extend(down);
+    window.step();
+    let undone = window.viewer().edits.now().camera.clone();
+    assert_ne!(undone, before);
+    window.steps(5);
+    window.harness.input_mut().events.push(event(false, Modifiers::NONE));
+    window.steps(2);
+    assert_eq!(window.viewer().edits.now().camera, undone);
+    // What is held when the window goes flies nowhere in the next.
+    window.viewer().enter(None, None);
+    window.harness.input_mut().events.push(event(true, Modifiers::NONE));
+    window.step();
+    let before = window.viewer().edits.now().camera.clone();
+    assert_ne!(before, undone);
+    window.viewer().enter(None, None);
+    window.steps(5);
+    assert_eq!(window.viewer().edits.now().camera, before);
+}
+
+/// By itself, as E has always been; not in a flight, nor with the right button held.
+#[test]
+fn a_shortcut_where_keys_fly_is_one_by_itself() {
+    let mut window = bare();
+    window.viewer().edit_at(0.0, "test", |settings| settings.exposure = Some(1.0));
+    let exposure = |window: &mut Window| window.viewer().edits.now().exposure;
+    // Dvorak: E lies at D, a comma at W.
+    let (e, comma) = ((Key::E, Key::D), (Key::Comma, Key::W));
+    assert_eq!(hold(&mut window, &[e], Modifiers::NONE), glam::Vec3::ZERO);
+    assert_eq!(exposure(&mut window), Some(1.5));
+    assert_eq!(hold(&mut window, &[e], Modifiers::SHIFT), glam::Vec3::ZERO);
+    assert_eq!(exposure(&mut window), Some(1.0));
+    let moved = hold(&mut window, &[comma, e], Modifiers::NONE);
+    assert!(moved.x > 1e-3 && moved.z > moved.x, "{moved}");
+    let middle = window.harness.get_by_role_and_label(Role::Image, "Picture").rect().center();
+    let (button, modifiers) = (PointerButton::Secondary, Modifiers::NONE);
+    let press = |pressed| Event::PointerButton { pos: middle, button, pressed, modifiers };
+    window.harness.input_mut().events.extend([Event::PointerMoved(middle), press(true)]);
+    window.step();
+    let moved = hold(&mut window, &[e], Modifiers::NONE);
+    assert!(moved.normalize_or_zero().abs_diff_eq(glam::Vec3::X, 1e-3), "{moved}");
+    // A period, at E: up in the world, to which the camera leans a little.
+    let moved = hold(&mut window, &[(Key::Period, Key::E)], Modifiers::NONE);
+    assert!(moved.normalize_or_zero().abs_diff_eq(glam::Vec3::Y, 0.02), "{moved}");
+    window.harness.input_mut().events.push(press(false));
+    window.step();
+    assert_eq!(exposure(&mut window), Some(1.0));
+}
