@@ -442,6 +442,7 @@ impl Viewer {
         let began = Instant::now();
         make_legible(ui.ctx());
         self.look_at_engine(ui);
+        ui.input(|i| self.start.drag.update(i));
         let wanted = self.wanted.clone();
         self.had_popup = egui::Popup::is_any_open(ui.ctx());
         // What is done with a button held is one step, however long it rests.
@@ -478,7 +479,7 @@ impl Viewer {
             None => super::start::show(ui, self),
         });
         if self.wanted.scene.is_some() {
-            super::start::drop_hint(ui);
+            super::start::drop_hint(ui, self);
         }
         super::help::show(ui, self);
         self.messages.show(ui);

@@ -4,7 +4,9 @@ use std::path::Path;
 use std::sync::mpsc;
 
 use eframe::egui;
-use egui::{Align2, Color32, FontId, Id, Rect, Response, Sense, Stroke, StrokeKind, TextureHandle, Ui, pos2, vec2};
+use egui::{
+    Align2, Color32, Event, FontId, Id, Rect, Response, Sense, Stroke, StrokeKind, TextureHandle, Ui, pos2, vec2,
+};
 use sunfleck::scene::shipped::NAMES;
 
 use super::app::Viewer;
@@ -29,6 +31,38 @@ pub struct Page {
     /// Of the shipped scenes, in their order; made when they are first shown.
     thumbnails: Vec<Option<TextureHandle>>,
     absent: Absent,
+    pub drag: Drag,
+}
+
+/// Files that are dragged over the window. Nobody tells of the death of their source; but then the pointer is back, which
+/// moves over the window in no drag.
+#[derive(Default)]
+pub struct Drag {
+    /// Files that hovered over the window in the frame before, as far as the system tells.
+    n_told: usize,
+    /// The first of them, which do so no more.
+    n_gone: usize,
+}
+
+impl Drag {
+    /// At every frame.
+    pub fn update(&mut self, input: &egui::InputState) {
+        let is_pointer = |event: &Event| matches!(event, Event::PointerMoved(_) | Event::PointerButton { .. });
+        if input.events.iter().any(is_pointer) {
+            self.n_gone = self.n_told;
+        }
+        self.n_told = input.raw.hovered_files.len();
+        self.n_gone = self.n_gone.min(self.n_told);
+    }
+
+    /// Name of the file that hovers over the window; empty where the system does not tell.
+    fn hovering(&self, ui: &Ui) -> Option<String> {
+        ui.input(|i| {
+            let file = i.raw.hovered_files.get(self.n_gone)?;
+            let name = file.path.as_ref().and_then(|path| path.file_name());
+            Some(name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default())
+        })
+    }
 }
 
 /// Which of the recent files are not there any more: those alone that were looked for in vain.
@@ -112,7 +146,7 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer) {
 
 /// Where to drop a file; lights up while one hovers over the window.
 fn drop_place(ui: &mut Ui, viewer: &mut Viewer) {
-    let hovering = hovering(ui);
+    let hovering = viewer.start.drag.hovering(ui);
     let visuals = ui.visuals();
     let (fill, stroke) = match hovering {
         Some(_) => (visuals.selection.bg_fill.gamma_multiply(0.35), Stroke::new(2.0, visuals.selection.stroke.color)),
@@ -142,18 +176,9 @@ fn drop_place(ui: &mut Ui, viewer: &mut Viewer) {
     ui.add(egui::Label::new(egui::RichText::new(text).size(15.0)).truncate());
 }
 
-/// Name of the file that hovers over the window; empty where the system does not tell.
-fn hovering(ui: &Ui) -> Option<String> {
-    ui.input(|i| {
-        let file = i.raw.hovered_files.first()?;
-        let name = file.path.as_ref().and_then(|path| path.file_name());
-        Some(name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default())
-    })
-}
-
 /// Says over an open scene that a file can be dropped.
-pub fn drop_hint(ui: &Ui) {
-    let Some(name) = hovering(ui) else { return };
+pub fn drop_hint(ui: &Ui, viewer: &Viewer) {
+    let Some(name) = viewer.start.drag.hovering(ui) else { return };
     let painter = ui.ctx().layer_painter(egui::LayerId::new(egui::Order::Foreground, Id::unique("drop hint")));
     let area = ui.ctx().content_rect();
     painter.rect_filled(area, 0.0, Color32::from_black_alpha(150));

@@ -53,6 +53,37 @@ pub fn bare() -> Window {
     window
 }
 
+/// Nobody tells the window that the source of a drag has died.
+#[test]
+fn a_file_hovers_until_the_pointer_is_back() {
+    let mut window = Window::new(None);
+    let hover = |window: &mut Window, name: &str| {
+        let file = egui::HoveredFile { path: Some(name.into()), ..Default::default() };
+        window.harness.input_mut().hovered_files.push(file);
+    };
+    let moves = |window: &mut Window| {
+        window.harness.input_mut().events.push(Event::PointerMoved(egui::pos2(300.0, 20.0)));
+        window.steps(2);
+    };
+    // On the way to where the drag begins, perhaps.
+    hover(&mut window, "a.glb");
+    moves(&mut window);
+    window.steps(100);
+    assert!(window.shows("Drop it to open a.glb"));
+    moves(&mut window);
+    assert!(window.shows("or drop a file here"));
+    // The system still names it before another.
+    hover(&mut window, "b.glb");
+    window.steps(2);
+    assert!(window.shows("Drop it to open b.glb"));
+    window.harness.input_mut().hovered_files.clear();
+    window.steps(2);
+    assert!(window.shows("or drop a file here"));
+    hover(&mut window, "c.glb");
+    window.steps(2);
+    assert!(window.shows("Drop it to open c.glb"));
+}
+
 fn choose(window: &mut Window, menu: &str, item: &str) {
     window.click(menu);
     window.click(item);
