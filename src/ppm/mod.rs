@@ -9,39 +9,10 @@ pub mod radius;
 pub mod stages;
 
 use crate::layout;
+pub use crate::scene::settings::{Direct, FirstRadius, Kernel};
 pub use film::Film;
 pub use radius::{FirstRadii, RadiusSchedule, first_radii, reaches};
 pub use stages::{Error, Interrupt, StageTimes, Stages};
-
-/// Density estimation kernel over t = d/r, each with unit integral over the disc.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Kernel {
-    /// 2(1 − t²)/(πr²).
-    #[default]
-    Epanechnikov,
-    /// 1/(πr²).
-    Constant,
-}
-
-/// Who brings the light that comes straight from a lamp.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Direct {
-    /// Lights are sampled where the eye path gathers; photons carry what has bounced.
-    #[default]
-    Sampled,
-    /// Photons carry everything.
-    Photons,
-}
-
-/// The first radius.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum FirstRadius {
-    /// One per pixel, from the pixel's footprint and the density of a first photon pass ([`radius::first_radii`]).
-    #[default]
-    Automatic,
-    /// The same everywhere, metres.
-    Fixed(f32),
-}
 
 /// What a render is asked to do. Nothing here depends on the backend.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,7 +27,7 @@ pub struct Params {
     pub n_paths: u32,
     /// Knaus & Zwicker's α in (0, 1): the share of the radius' area that an iteration keeps is (i+α)/(i+1).
     pub alpha: f32,
-    /// First radius.
+    /// First radius; the automatic ones are those of [`first_radii`].
     pub radius: FirstRadius,
     /// Density estimation kernel.
     pub kernel: Kernel,

@@ -383,6 +383,7 @@ fn the_setting_of_the_literature() {
     let settings = &report["settings"];
     assert_eq!((&settings["maxEyeSegments"], &settings["maxPhotonSegments"]), (&json!(5), &json!(5)));
     assert_eq!((&settings["roulette"], &settings["direct"]), (&json!(false), &json!("photons")));
+    assert_eq!((&settings["kernel"], &settings["firstRadius"]), (&json!("epanechnikov"), &json!(null)));
     assert!(report["radius"]["first"].as_f64().unwrap() > 0.0);
 }
 

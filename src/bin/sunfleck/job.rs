@@ -6,9 +6,9 @@ use anyhow::{Context, Result, bail, ensure};
 use sunfleck::layout::EyeVertex;
 use sunfleck::output::atomic;
 use sunfleck::output::png::Look;
-use sunfleck::ppm::{Direct, FirstRadius, Kernel, Params};
+use sunfleck::ppm::{Direct, FirstRadius, Params};
 use sunfleck::scene::load::Loaded;
-use sunfleck::scene::{Camera, Scene, Settings, settings};
+use sunfleck::scene::{Camera, Scene, Settings};
 
 use crate::cli::{InputArgs, RenderArgs, Usage};
 use crate::scenes::{Source, same_file};
@@ -78,7 +78,7 @@ impl Job {
             (None, None) => Budget { iterations: Some(DEFAULT_ITERATIONS), seconds: Some(DEFAULT_SECONDS) },
             (iterations, seconds) => Budget { iterations, seconds },
         };
-        let radius = args.input.radius.or(settings.radius.map(first_radius)).unwrap_or_default();
+        let radius = args.input.radius.or(settings.radius).unwrap_or_default();
         Ok(Self {
             scene_name,
             outputs: args.output.clone(),
@@ -138,9 +138,9 @@ pub fn params(settings: &Settings, args: &InputArgs, camera: &Camera) -> Result<
     params.seed = args.seed.or(settings.seed).unwrap_or(params.seed);
     params.n_paths = args.photons.or(settings.photons.map(|n| n.0)).unwrap_or(params.n_paths);
     params.alpha = args.alpha.or(settings.alpha).unwrap_or(params.alpha);
-    params.radius = args.radius.or(settings.radius.map(first_radius)).unwrap_or(params.radius);
-    params.kernel = args.kernel.or(settings.kernel.map(kernel)).unwrap_or(params.kernel);
-    params.direct = args.direct.or(settings.direct.map(direct)).unwrap_or(params.direct);
+    params.radius = args.radius.or(settings.radius).unwrap_or(params.radius);
+    params.kernel = args.kernel.or(settings.kernel).unwrap_or(params.kernel);
+    params.direct = args.direct.or(settings.direct).unwrap_or(params.direct);
     if let Some(n) = args.max_segments.or(settings.max_segments) {
         params.max_segments = n;
         params.max_eye_segments = params.max_eye_segments.min(n);
@@ -155,27 +155,6 @@ pub fn use_paper_mode(params: &mut Params) {
     params.roulette = false;
     params.max_eye_segments = PAPER_SEGMENTS;
     params.max_photon_segments = PAPER_SEGMENTS;
-}
-
-fn first_radius(radius: settings::FirstRadius) -> FirstRadius {
-    match radius {
-        settings::FirstRadius::Automatic => FirstRadius::Automatic,
-        settings::FirstRadius::Fixed(radius) => FirstRadius::Fixed(radius),
-    }
-}
-
-fn kernel(kernel: settings::Kernel) -> Kernel {
-    match kernel {
-        settings::Kernel::Epanechnikov => Kernel::Epanechnikov,
-        settings::Kernel::Constant => Kernel::Constant,
-    }
-}
-
-fn direct(direct: settings::Direct) -> Direct {
-    match direct {
-        settings::Direct::Sampled => Direct::Sampled,
-        settings::Direct::Photons => Direct::Photons,
-    }
 }
 
 /// Of the picture, pixels: as the settings say, else as the camera.

@@ -65,9 +65,9 @@ pub struct Settings {
     /// Metres; null: automatic.
     pub first_radius: Option<f32>,
     /// `epanechnikov` or `constant`.
-    pub kernel: &'static str,
+    pub kernel: Kernel,
     /// `sampled` or `photons`.
-    pub direct: &'static str,
+    pub direct: Direct,
     /// Russian roulette.
     pub roulette: bool,
     /// Of an eye path.
@@ -150,14 +150,8 @@ impl Settings {
                 FirstRadius::Automatic => None,
                 FirstRadius::Fixed(r) => Some(r),
             },
-            kernel: match params.kernel {
-                Kernel::Epanechnikov => "epanechnikov",
-                Kernel::Constant => "constant",
-            },
-            direct: match params.direct {
-                Direct::Sampled => "sampled",
-                Direct::Photons => "photons",
-            },
+            kernel: params.kernel,
+            direct: params.direct,
             roulette: params.roulette,
             max_eye_segments: params.max_eye_segments,
             max_photon_segments: params.max_photon_segments,

@@ -13,31 +13,34 @@ pub struct Count(pub u32);
 pub struct Size(pub [u32; 2]);
 
 /// The first radius, written in metres or `"automatic"`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum FirstRadius {
-    /// Chosen by the renderer, pixel by pixel.
+    /// One per pixel, from the pixel's footprint and the density of a first photon pass.
+    #[default]
     Automatic,
-    /// Metres.
+    /// The same everywhere, metres.
     Fixed(f32),
 }
 
-/// Density estimation kernel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Density estimation kernel over t = d/r, each with unit integral over the disc.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kernel {
-    /// Falls to nothing at the radius.
+    /// 2(1 − t²)/(πr²).
+    #[default]
     Epanechnikov,
-    /// The same everywhere.
+    /// 1/(πr²).
     Constant,
 }
 
-/// Who brings light straight from a lamp.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Who brings the light that comes straight from a lamp.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Direct {
-    /// Lights are sampled.
+    /// Lights are sampled where the eye path gathers; photons carry what has bounced.
+    #[default]
     Sampled,
-    /// Photons.
+    /// Photons carry everything.
     Photons,
 }
 
@@ -243,7 +246,23 @@ impl<'de> Deserialize<'de> for FirstRadius {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Settings;
     use super::*;
+
+    #[test]
+    fn each_value_has_its_text() {
+        let said = |text: &str| {
+            let settings = Settings::parse(text, "a.toml".as_ref()).unwrap();
+            assert_eq!(settings.to_toml().trim_end(), text);
+            settings
+        };
+        assert_eq!(said("kernel = \"epanechnikov\"").kernel, Some(Kernel::Epanechnikov));
+        assert_eq!(said("kernel = \"constant\"").kernel, Some(Kernel::Constant));
+        assert_eq!(said("direct = \"sampled\"").direct, Some(Direct::Sampled));
+        assert_eq!(said("direct = \"photons\"").direct, Some(Direct::Photons));
+        assert_eq!(said("radius = \"automatic\"").radius, Some(FirstRadius::Automatic));
+        assert_eq!(said("radius = 0.25").radius, Some(FirstRadius::Fixed(0.25)));
+    }
 
     #[test]
     fn counts_have_units() {
