@@ -35,6 +35,7 @@ use glam::{Mat4, Vec3, Vec4};
 
 use super::{Error, Picture, VERSION, atomic};
 use crate::layout::Camera;
+use crate::ppm::{Params, RadiusSchedule};
 
 /// Where a picture came from.
 #[derive(Clone, Debug, Default)]
@@ -65,6 +66,22 @@ pub struct Header {
     pub seconds: f64,
     /// The camera.
     pub camera: Camera,
+}
+
+impl Header {
+    /// What an estimate of `params` says of itself after so many `iterations`; `first_radius`: metres, the median over the
+    /// pixels. The rest is empty.
+    pub fn of(params: &Params, first_radius: f32, iterations: u32) -> Self {
+        Self {
+            seed: params.seed,
+            alpha: params.alpha,
+            first_radius,
+            last_radius: first_radius * RadiusSchedule::new(params.alpha).scale(iterations),
+            iterations,
+            photons_per_iteration: params.n_paths,
+            ..Self::default()
+        }
+    }
 }
 
 /// Writes `picture`, losslessly compressed.
@@ -206,30 +223,28 @@ mod tests {
             position: [5.0, 1.0, 0.0],
             ..Camera::default()
         };
+        let params = Params { seed: u32::MAX, alpha: 0.5, n_paths: 1_234, ..Params::new(20, 10) };
         let header = Header {
             scene: "söne".into(),
             adapter: "llvmpipe".into(),
             index: "tree".into(),
             accelerator: "bvh".into(),
-            seed: u32::MAX,
-            alpha: 0.5,
-            first_radius: 0.25,
-            last_radius: 0.125,
-            iterations: 7,
-            photons_per_iteration: 500_000,
             seconds: 2.5,
             camera,
-            ..Header::default()
+            ..Header::of(&params, 0.25, 2)
         };
         write(&path, &picture(), &header).unwrap();
         let meta = ::exr::meta::MetaData::read_from_file(&path, true).unwrap();
         let own = &meta.headers[0].own_attributes;
         let get = |name: &str| own.other[&Text::from(name)].clone();
         assert_eq!(get("seed"), AttributeValue::F64(f64::from(u32::MAX)));
-        assert_eq!(get("iterations"), AttributeValue::I32(7));
-        assert_eq!(get("photonsPerIteration"), AttributeValue::I32(500_000));
+        assert_eq!(get("iterations"), AttributeValue::I32(2));
+        assert_eq!(get("photonsPerIteration"), AttributeValue::I32(1_234));
         assert_eq!(get("alpha"), AttributeValue::F32(0.5));
-        assert_eq!(get("lastRadius"), AttributeValue::F32(0.125));
+        assert_eq!(get("firstRadius"), AttributeValue::F32(0.25));
+        // r₂² = r₁² · (1+α)/2
+        let AttributeValue::F32(last) = get("lastRadius") else { panic!("a float") };
+        assert!((last - 0.25 * 0.75f32.sqrt()).abs() < 1e-6, "{last}");
         for (name, value) in [("sunfleckVersion", VERSION), ("index", "tree"), ("accelerator", "bvh")] {
             assert_eq!(get(name), AttributeValue::Text(Text::from(value)));
         }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, anyhow, bail};
 use sunfleck::layout::Camera;
 use sunfleck::output::{self, Picture};
-use sunfleck::ppm::{self, Error, Film, FirstRadii, FirstRadius, Params, RadiusSchedule, Stages};
+use sunfleck::ppm::{self, Error, Film, FirstRadii, FirstRadius, Params, Stages};
 
 use crate::cli::RenderArgs;
 use crate::devices;
@@ -206,21 +206,15 @@ impl<'a> Run<'a> {
             rgb: self.film.rgb(),
             variance: self.args.variance.then(|| self.film.variance_of_mean()),
         };
-        let n = self.film.n_iterations;
         let header = output::exr::Header {
             scene: self.job.scene_name.clone(),
             command: command_line(),
             adapter: self.report.device.name.clone(),
             index: self.report.device.index.clone(),
             accelerator: self.report.device.accelerator.clone(),
-            seed: params.seed,
-            alpha: params.alpha,
-            first_radius: self.radii[1],
-            last_radius: self.radii[1] * RadiusSchedule::new(params.alpha).scale(n),
-            iterations: n,
-            photons_per_iteration: params.n_paths,
             seconds: self.report.seconds.render,
             camera: self.camera,
+            ..output::exr::Header::of(params, self.radii[1], self.film.n_iterations)
         };
         let mut first_error = None;
         for path in &self.job.outputs {

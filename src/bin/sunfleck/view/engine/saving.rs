@@ -44,7 +44,7 @@ impl Save {
 
     /// Writes a film. Returns the number of its iterations.
     pub fn write(&self, frame: &Frame) -> Result<u32> {
-        let (film, params, machine) = (&frame.film, &frame.params, &frame.machine);
+        let (film, machine) = (&frame.film, &frame.machine);
         frame.opened.source.check_not_read(&self.settings, &self.path)?;
         let picture = frame.picture();
         if job::is_png(&self.path) {
@@ -58,14 +58,9 @@ impl Save {
                 adapter: machine.device.clone(),
                 index: machine.index.clone(),
                 accelerator: frame.scene.accelerator().to_string(),
-                seed: params.seed,
-                alpha: params.alpha,
-                first_radius: frame.first_radius,
-                last_radius: frame.radius,
-                iterations: film.n_iterations,
-                photons_per_iteration: params.n_paths,
                 seconds: frame.seconds,
                 camera: frame.camera,
+                ..output::exr::Header::of(&frame.params, frame.first_radius, film.n_iterations)
             };
             output::exr::write(&self.path, &picture, &header)?;
         }
