@@ -197,7 +197,7 @@ pub fn section(ui: &mut egui::Ui, viewer: &mut Viewer) {
         row(ui, "Largest difference", figures.map(|f| number(f.max_difference)), "Largest |x − y|, W/(m² sr)");
         if let Some(f) = figures.filter(|f| f.not_finite > 0) {
             let text = format!("{} of {}", f.not_finite, f.not_finite + f.pixels);
-            row(ui, "Not finite", Some(text), "Pixels left out, not finite in the picture or in the reference");
+            row(ui, "Not finite", Some(text), "Left out, not finite in the picture or the reference: magenta");
         }
         let shown = painted.and_then(|painted| Some((painted.painting.comparison, painted.mean?)));
         let flip = shown.filter(|(comparison, _)| *comparison == Comparison::Flip);

@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 use sunfleck::inspect::{self, ColorBy, Object};
 use sunfleck::output::difference::Measure;
 use sunfleck::output::display;
-use sunfleck::output::false_colour;
+use sunfleck::output::false_colour::{self, NOT_FINITE};
 use sunfleck::output::tonemap::srgb_encode;
 use sunfleck::ppm::FirstRadii;
 use sunfleck::ppm::film::luminance;
@@ -161,6 +161,17 @@ fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
             });
         }
     }
+    // With a reference, of either.
+    let not_finite = painted.figures.map_or(painted.histogram.luminance.not_finite, |f| f.not_finite as u64);
+    if not_finite > 0 {
+        ui.horizontal(|ui| {
+            ui.label(RichText::new("■").color(rgba(NOT_FINITE)));
+            ui.weak("not finite").on_hover_text(
+                "Pixels that are NaN or infinite, in the picture or the reference. Only the window has this colour for \
+                 them: in a .png they are black or white, in an .exr what they are.",
+            );
+        });
+    }
     if let (Some(color_by), Some(insides)) = (painted.painting.photons, &painted.frame.insides) {
         match color_by {
             ColorBy::Power => {
@@ -239,7 +250,8 @@ fn cursor(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
         }
         let exposed = film.map(|(painted, _, rgb, _)| rgb.map(|c| c * painted.exposure.exp2()));
         row(ui, "Exposed", exposed.map(three), "Radiance after exposure; 0.18 is mid grey");
-        let shown = film.map(|(painted, _, rgb, _)| on_display(rgb, painted));
+        let finite = film.filter(|(_, _, rgb, _)| rgb.iter().all(|c| c.is_finite()));
+        let shown = finite.map(|(painted, _, rgb, _)| on_display(rgb, painted));
         row(
             ui,
             "Display",

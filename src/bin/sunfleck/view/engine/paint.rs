@@ -12,7 +12,7 @@ use sunfleck::output::compare::{Difference, compare};
 use sunfleck::output::convergence::Halves;
 use sunfleck::output::difference::{self, Measure};
 use sunfleck::output::display::{self, Look};
-use sunfleck::output::false_colour::{self, Scale};
+use sunfleck::output::false_colour::{self, NOT_FINITE, Scale};
 use sunfleck::output::flip::{self, flip};
 use sunfleck::output::histogram::Histogram;
 use sunfleck::output::tonemap::{ToneMap, srgb_encode};
@@ -393,11 +393,10 @@ impl Painter {
                 && (before.exposure, before.tonemap, before.in_stops) == (exposure, tonemap, in_stops)
         };
         let now = before.filter(is_same).unwrap_or_else(|| {
-            let mut rgba = vec![];
-            match in_stops {
-                true => false_colour::luminance_in_stops(&reference.picture.rgb, exposure, STOPS, &mut rgba),
-                false => display::rgba8(&reference.picture, exposure, tonemap, &mut rgba),
-            }
+            let rgba = match in_stops {
+                true => in_false_colour(&reference.picture, exposure),
+                false => on_display(&reference.picture, exposure, tonemap),
+            };
             let size = reference.picture.crop_size();
             ReferenceImage { of: Arc::clone(reference), exposure, tonemap, in_stops, image: image(size, &rgba).into() }
         });
@@ -413,8 +412,7 @@ impl Painter {
         };
         let as_picture = |rgb: Vec<[f32; 3]>| {
             let picture = Picture { rgb, size: frame.params.size, crop: frame.params.crop, variance: None };
-            let mut rgba = vec![];
-            display::rgba8(&picture, exposure, painting.look.tonemap, &mut rgba);
+            let rgba = on_display(&picture, exposure, painting.look.tonemap);
             Colours { rgba, values: Values::Rgb(Arc::new(picture.rgb)), legend: None, mean: None }
         };
         // Until the first iteration with photons has been read back, the picture stands for them.
@@ -422,8 +420,7 @@ impl Painter {
         match painting.view {
             View::Picture => as_picture(picture.rgb),
             View::Stops => {
-                let mut rgba = vec![];
-                false_colour::luminance_in_stops(&picture.rgb, exposure, STOPS, &mut rgba);
+                let rgba = in_false_colour(&picture, exposure);
                 let values = picture.rgb.iter().map(|&rgb| stops(rgb, exposure)).collect();
                 let values = Values::Scalar(Arc::new(values));
                 let legend = Some(Legend { range: STOPS, log: false, signed: false });
@@ -474,6 +471,30 @@ impl Painter {
             .insert(kept.unwrap_or_else(|| (Arc::clone(frame), FirstHits::trace(&frame.scene, &frame.view()))));
         hits
     }
+}
+
+/// As a PNG has it, but for pixels that are not finite: in the window they are [`NOT_FINITE`], in every view and comparison,
+/// where a tone curve makes black or white of them. A file is to be looked at without a legend, and keeps the curve's.
+fn on_display(picture: &Picture, exposure: f32, tonemap: ToneMap) -> Vec<u8> {
+    let mut rgba = vec![];
+    display::rgba8(picture, exposure, tonemap, &mut rgba);
+    mark(&mut rgba, &picture.rgb);
+    rgba
+}
+
+/// Luminance in stops.
+fn in_false_colour(picture: &Picture, exposure: f32) -> Vec<u8> {
+    let mut rgba = vec![];
+    false_colour::luminance_in_stops(&picture.rgb, exposure, STOPS, &mut rgba);
+    rgba
+}
+
+/// Marks the pixels of `rgba` whose values are not finite.
+fn mark(rgba: &mut [u8], values: &[[f32; 3]]) {
+    rgba.par_chunks_mut(1 << 14).zip(values.par_chunks(1 << 12)).for_each(|(rgba, values)| {
+        let pixels = rgba.chunks_exact_mut(4).zip(values).filter(|(_, rgb)| !rgb.iter().all(|c| c.is_finite()));
+        pixels.for_each(|(rgba, _)| rgba.copy_from_slice(&NOT_FINITE));
+    });
 }
 
 /// From bytes with an alpha of 255 to what textures are made from.
@@ -570,6 +591,7 @@ fn far(colours: &mut Colours) {
 /// Three numbers as the colour that `encoded` makes of them, in [0, 1].
 fn plain(values: Vec<[f32; 3]>, encoded: fn([f32; 3]) -> [f32; 3]) -> Colours {
     let byte = |c: f32| (255.0 * c.clamp(0.0, 1.0) + 0.5) as u8;
-    let rgba = values.iter().map(|&v| encoded(v).map(byte)).flat_map(|[r, g, b]| [r, g, b, 255]).collect();
+    let mut rgba: Vec<_> = values.iter().map(|&v| encoded(v).map(byte)).flat_map(|[r, g, b]| [r, g, b, 255]).collect();
+    mark(&mut rgba, &values);
     Colours { rgba, values: Values::Rgb(Arc::new(values)), legend: None, mean: None }
 }

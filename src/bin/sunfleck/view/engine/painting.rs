@@ -189,7 +189,11 @@ fn publish(board: &mut Board, task: &Task, painted: Arc<Painted>, estimated: Opt
 
 #[cfg(test)]
 mod tests {
+    use eframe::egui::ColorImage;
     use sunfleck::output::difference::Measure;
+    use sunfleck::output::display;
+    use sunfleck::output::false_colour::NOT_FINITE;
+    use sunfleck::output::tonemap::ToneMap;
     use sunfleck::ppm::Interrupt;
 
     use super::super::paint::{Comparison, Needs, View};
@@ -282,6 +286,38 @@ mod tests {
         // As if made for the first time.
         let painted = Painter::default().paint(&second, Some(Arc::clone(&reference)), painting);
         assert!(painted.reference.unwrap().1 == brighter);
+    }
+
+    /// In the window alone, and wherever it shows the picture or the reference.
+    #[test]
+    fn what_is_not_finite_is_marked() {
+        let ([first, ..], _) = frames();
+        let mut film = first.film.as_ref().clone();
+        film.pixels[3][0] = f32::INFINITY;
+        film.pixels[4][2] = f32::NAN;
+        let frame = Arc::new(Frame { film: Arc::new(film), ..Frame::clone(&first) });
+        let mut picture = first.picture();
+        picture.rgb[5] = [f32::NEG_INFINITY, 0.0, 0.0];
+        let reference = Arc::new(Reference { name: String::new(), picture });
+        let marked = |image: &ColorImage| -> Vec<usize> {
+            (0..image.pixels.len()).filter(|&i| image.pixels[i].to_array() == NOT_FINITE).collect()
+        };
+        // Those of a kind of light are the picture until an iteration is looked into.
+        for view in [View::Picture, View::Stops, View::Direct] {
+            let painting = Painting { view, comparison: Comparison::Wipe, ..Painting::default() };
+            let painted = Painter::default().paint(&frame, Some(Arc::clone(&reference)), painting);
+            assert_eq!(marked(&painted.image), [3, 4], "{view:?}");
+            assert_eq!(marked(&painted.reference.as_ref().unwrap().1), [5], "{view:?}");
+        }
+        for comparison in Measure::ALL.map(Comparison::Difference).into_iter().chain([Comparison::Flip]) {
+            let painting = Painting { comparison, ..Painting::default() };
+            let painted = Painter::default().paint(&frame, Some(Arc::clone(&reference)), painting);
+            assert_eq!(marked(&painted.image), [3, 4, 5], "{comparison:?}");
+        }
+        // Not what is written.
+        let mut bytes = vec![];
+        display::rgb8(&frame.picture(), 0.0, ToneMap::Srgb, &mut bytes);
+        assert!(bytes.chunks_exact(3).all(|rgb| rgb != &NOT_FINITE[..3]));
     }
 
     #[test]
