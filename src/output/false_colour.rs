@@ -91,12 +91,9 @@ pub fn luminance_in_stops(rgb: &[[f32; 3]], exposure: f32, stops: [f32; 2], byte
     });
 }
 
-/// Signed values, RGBA8: green above 0, red below, black at 0; the encoded sRGB of |v| over `most`, full at and above it.
-/// Without `most` it is the 99th percentile of |v|. Gives the one used, above 0.
-pub fn signed(values: &[f32], most: Option<f32>, bytes: &mut Vec<u8>) -> f32 {
-    let automatic = || automatic_range(&values.iter().map(|v| v.abs()).collect::<Vec<_>>(), false)[1];
-    let most = most.unwrap_or_else(automatic);
-    let most = if most > 0.0 && most.is_finite() { most } else { 1.0 };
+/// Signed values, RGBA8: green above 0, red below, black at 0; the encoded sRGB of |v| over `most` (above 0), full from
+/// there on.
+pub fn signed(values: &[f32], most: f32, bytes: &mut Vec<u8>) {
     paint(values, bytes, |&v| {
         let level = (srgb_encode((v.abs() / most).min(1.0)) * 255.0 + 0.5) as u8;
         match v {
@@ -105,7 +102,6 @@ pub fn signed(values: &[f32], most: Option<f32>, bytes: &mut Vec<u8>) -> f32 {
             _ => [0, level, 0, 255],
         }
     });
-    most
 }
 
 fn paint<T: Sync>(values: &[T], bytes: &mut Vec<u8>, colour: impl Fn(&T) -> [u8; 4] + Sync) {
@@ -137,6 +133,15 @@ fn cubehelix(place: f32) -> [u8; 4] {
     let amplitude = place * (1.0 - place) / 2.0;
     let level = |c: f32, s: f32| ((place + amplitude * (c * cos + s * sin)).clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
     [level(-0.14861, 1.78277), level(-0.29227, -0.90649), level(1.97294, 0.0), 255]
+}
+
+/// The least of 1, 2 and 5 times the powers of ten that is no less than `value`, which is above 0; finite.
+pub fn round_up(value: f32) -> f32 {
+    let slack = 1.0 - 1e-6; // A round value is itself, which f32 rounds.
+    let value = f64::from(value);
+    let power = 10f64.powf(value.log10().floor());
+    let step = [1.0, 2.0, 5.0].into_iter().find(|step| step * power >= value * slack).unwrap_or(10.0);
+    (step * power).min(f32::MAX.into()) as f32
 }
 
 /// Round values inside `range` (low, high) for a legend, rising, two to nine: multiples of 1, 2 or 5 times a
@@ -219,10 +224,24 @@ mod tests {
     #[test]
     fn signs_are_green_and_red() {
         let mut bytes = Vec::new();
-        assert_eq!(signed(&[0.0, 2.0, -4.0, f32::NAN], Some(2.0), &mut bytes), 2.0);
+        signed(&[0.0, 2.0, -4.0, f32::NAN], 2.0, &mut bytes);
         assert_eq!(bytes, [[0, 0, 0, 255], [0, 255, 0, 255], [255, 0, 0, 255], NOT_FINITE].concat());
-        assert_eq!(signed(&[-3.0; 5], None, &mut bytes), 3.0);
-        assert_eq!(signed(&[0.0; 5], None, &mut bytes), 1.0);
+    }
+
+    #[test]
+    fn round_numbers_are_themselves_and_others_rise_to_them() {
+        for power in -40..=38 {
+            for (digits, round) in [("1", "1"), ("1.01", "2"), ("2", "2"), ("2.1", "5"), ("5", "5"), ("5.1", "10")] {
+                let number = |digits: &str| format!("{digits}e{power}").parse::<f32>().unwrap();
+                let (value, expected) = (number(digits), number(round).min(f32::MAX));
+                if value < f32::INFINITY {
+                    let rounded = round_up(value);
+                    // Below 1e-38 f32 has but few digits.
+                    assert!(rounded == expected || power < -37 && rounded >= value, "{value} {rounded}");
+                }
+            }
+        }
+        assert_eq!(round_up(f32::MAX), f32::MAX);
     }
 
     #[test]

@@ -14,6 +14,13 @@ use super::engine::{Comparison, Message, Reference, View};
 use super::files;
 use super::inspect::{row, table};
 use super::keys::Keyboard;
+use super::settings::number::{Number, drag};
+use super::settings::widgets::{choice, within};
+
+/// What is said of the range of a difference.
+pub const RANGE: &str = "Where the colours of a difference end; what is above has the last of them, and what is not finite is \
+                         magenta. Automatic: at the 99th percentile, rounded up, without what differs by more than ten \
+                         times white or ten times the reference.";
 
 /// Half the width of what the line of the wipe is held by, points.
 const HOLD: f32 = 6.0;
@@ -170,6 +177,9 @@ pub fn section(ui: &mut egui::Ui, viewer: &mut Viewer) {
         })
         .response
         .on_hover_text(format!("{text}. Does not restart the estimate."));
+    if let Comparison::Difference(measure) = *wanted {
+        range(ui, viewer, measure);
+    }
     let painted = viewer.picture.painted();
     if let Some(problem) = painted.and_then(|painted| painted.problem.as_ref()) {
         ui.colored_label(ui.visuals().error_fg_color, problem);
@@ -204,6 +214,29 @@ pub fn section(ui: &mut egui::Ui, viewer: &mut Viewer) {
         row(ui, "FLIP", flip.map(|(_, mean)| number(mean)), "Mean; measured while FLIP is shown");
         let difference = shown.filter(|(comparison, _)| *comparison != Comparison::Flip);
         row(ui, "Mean shown", difference.map(|(_, mean)| number(mean)), "Of the difference that is shown");
+    });
+}
+
+/// The end of a difference's colours: automatic, or a number.
+fn range(ui: &mut egui::Ui, viewer: &mut Viewer, measure: Measure) {
+    let shown = viewer.picture.painted().filter(|p| p.difference() == Some(Comparison::Difference(measure)));
+    let automatic = shown.and_then(|painted| painted.legend.as_ref()).map_or(1.0, |legend| legend.range[1]);
+    let end = &mut viewer.wanted.painting.ends[measure as usize];
+    ui.horizontal(|ui| {
+        let label = ui.label("Range").on_hover_text(RANGE);
+        let mut is_given = end.is_some();
+        let all = [(false, "Automatic", "By the differences that there are."), (true, "Given", "Up to a number.")];
+        let size = egui::vec2(100.0, ui.spacing().interact_size.y);
+        let mut inside = within(ui, size, egui::Layout::left_to_right(egui::Align::Center));
+        let response = choice(&mut inside, "range", &mut is_given, &all);
+        if response.labelled_by(label.id).on_hover_text(RANGE).changed() {
+            *end = is_given.then_some(automatic);
+        }
+        if let Some(end) = end {
+            let speed = 0.01 * f64::from(*end);
+            let field = drag(ui, end, Number::Plain, speed, 1e-30..=f32::MAX);
+            field.labelled_by(label.id).on_hover_text(RANGE);
+        }
     });
 }
 

@@ -153,6 +153,10 @@ fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
             false => rgba(false_colour::colour(t)),
         };
         bar(ui, "Legend", legend.range, legend.log, unit, map);
+        if let Some(Comparison::Difference(measure)) = painted.difference() {
+            let whose = if painted.painting.ends[measure as usize].is_some() { "as given" } else { "automatic" };
+            ui.weak(format!("to {}, {whose}", short(legend.range[1]))).on_hover_text(super::compare::RANGE);
+        }
         let shows_depth = painted.difference().is_none() && painted.painting.view == View::Depth;
         if legend.log || shows_depth {
             ui.horizontal(|ui| {
@@ -190,7 +194,7 @@ fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
 fn signed_color(legend: &Legend, t: f32) -> Color32 {
     let [low, high] = legend.range;
     let mut bytes = vec![];
-    false_colour::signed(&[low + (high - low) * t], Some(high), &mut bytes);
+    false_colour::signed(&[low + (high - low) * t], high, &mut bytes);
     rgb([bytes[0], bytes[1], bytes[2]])
 }
 

@@ -168,6 +168,9 @@ pub struct Painting {
     pub look: Look,
     pub view: View,
     pub comparison: Comparison,
+    /// Where the colours of each [`Measure`] end, in its own unit, above 0; automatic if none
+    /// ([`difference::Image::automatic_end`]).
+    pub ends: [Option<f32>; Measure::ALL.len()],
     /// Photons drawn over the picture.
     pub photons: Option<ColorBy>,
     /// Those that something hides too: behind glass, in the next room.
@@ -536,14 +539,15 @@ fn compared(
         Comparison::Off | Comparison::Wipe => return Ok(None),
         Comparison::Difference(measure) => {
             let image = difference::image(picture, reference, measure)?;
+            let end =
+                painting.ends[measure as usize].unwrap_or_else(|| image.automatic_end(measure, (-exposure).exp2()));
             let legend = if measure == Measure::Signed {
-                let most = false_colour::signed(&image.values, None, &mut rgba);
-                Legend { range: [-most, most], log: false, signed: true }
+                false_colour::signed(&image.values, end, &mut rgba);
+                Legend { range: [-end, end], log: false, signed: true }
             } else {
                 // Black is no difference.
-                let range = [0.0, false_colour::automatic_range(&image.values, false)[1]];
-                let range = false_colour::scalar(&image.values, &Scale { range: Some(range), log: false }, &mut rgba);
-                Legend { range, log: false, signed: false }
+                let scale = Scale { range: Some([0.0, end]), log: false };
+                Legend { range: false_colour::scalar(&image.values, &scale, &mut rgba), log: false, signed: false }
             };
             (image.values, legend, image.mean)
         }

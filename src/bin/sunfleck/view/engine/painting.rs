@@ -288,6 +288,33 @@ mod tests {
         assert!(painted.reference.unwrap().1 == brighter);
     }
 
+    #[test]
+    fn a_difference_ends_where_it_is_told_to() {
+        let ([first, second, _], _) = frames();
+        let mut picture = first.picture();
+        let n = picture.rgb.len();
+        picture.rgb[..n / 4].fill([1e30; 3]);
+        let reference = Arc::new(Reference { name: String::new(), picture });
+        for measure in Measure::ALL {
+            let mut painting = Painting { comparison: Comparison::Difference(measure), ..Painting::default() };
+            let paint = |painting| Painter::default().paint(&second, Some(Arc::clone(&reference)), painting);
+            let least = if measure == Measure::Signed { -1.0 } else { 0.0 };
+            let automatic = paint(painting);
+            let [low, high] = automatic.legend.as_ref().unwrap().range;
+            assert!(high > 0.0 && high < 100.0 && low == least * high, "{measure:?} {low} {high}");
+            // What is beside the block is seen.
+            assert!(automatic.image.pixels[n / 4..].iter().any(|c| c.r().max(c.g()).max(c.b()) > 100), "{measure:?}");
+            painting.ends[measure as usize] = Some(0.37);
+            let given = paint(painting);
+            assert_eq!(given.legend.as_ref().unwrap().range, [least * 0.37, 0.37], "{measure:?}");
+            assert!(given.image.pixels != automatic.image.pixels, "{measure:?}");
+            // That of another is none of its own.
+            painting.ends = [Some(0.37); Measure::ALL.len()];
+            painting.ends[measure as usize] = None;
+            assert!(paint(painting).image.pixels == automatic.image.pixels, "{measure:?}");
+        }
+    }
+
     /// In the window alone, and wherever it shows the picture or the reference.
     #[test]
     fn what_is_not_finite_is_marked() {

@@ -5,9 +5,9 @@ mod color;
 mod estimator;
 mod look;
 mod material;
-mod number;
+pub mod number;
 mod scene;
-mod widgets;
+pub mod widgets;
 
 use std::sync::Arc;
 

@@ -8,6 +8,7 @@ use egui::{ColorImage, Event, ImageData, Key, Modifiers, PointerButton, Role, Te
 use egui_kittest::TestRenderer;
 use egui_kittest::kittest::{NodeT, Queryable};
 use sunfleck::output::Picture;
+use sunfleck::output::difference::Measure;
 use sunfleck::output::false_colour::NOT_FINITE;
 
 use super::{NoPixels, Window};
@@ -54,6 +55,53 @@ fn what_is_not_finite_is_left_out_and_told() {
     let painted = compared(&mut window, |picture| picture.rgb.fill([0.0; 3]));
     assert!(painted.figures.is_some_and(|figures| figures.relative_mean_difference.is_none()));
     assert!(!window.shows(" %"));
+}
+
+#[test]
+fn the_range_of_a_difference_can_be_given() {
+    let mut window = Window::with_picture();
+    compared(&mut window, |picture| picture.rgb.iter_mut().for_each(|rgb| rgb[0] += 0.27));
+    assert!(window.harness.query_by_role_and_label(Role::ComboBox, "Range").is_none(), "FLIP ends at 1");
+    let absolute = Comparison::Difference(Measure::Absolute);
+    window.viewer().wanted.painting.comparison = absolute;
+    let wait = |window: &mut Window| {
+        window.wait("difference", |viewer| {
+            viewer.picture.painted().is_some_and(|painted| painted.painting == viewer.wanted.painting)
+        });
+        window.steps(3);
+    };
+    wait(&mut window);
+    assert!(window.shows("to 0.1, automatic") && window.shows("Legend: 0 to 0.1 "));
+    let choose = |window: &mut Window, item: &str| {
+        window.harness.get_by_role_and_label(Role::ComboBox, "Range").click_accesskit();
+        window.steps(3);
+        // Other lists of the window have the same items, closed.
+        window
+            .harness
+            .get_all_by_label(item)
+            .find(|node| node.accesskit_node().role() == Role::Button)
+            .unwrap()
+            .click();
+        window.steps(3);
+        wait(window);
+    };
+    let end = |window: &mut Window| window.viewer().wanted.painting.ends[Measure::Absolute as usize];
+    choose(&mut window, "Given");
+    assert_eq!(end(&mut window), Some(0.1));
+    assert!(window.shows("to 0.1, as given"));
+    for (typed, expected) in [("0,4", 0.4), ("0", 1e-30), ("2.5e-3", 0.0025)] {
+        window.harness.get_by_role_and_label(Role::SpinButton, "Range").focus();
+        window.steps(2);
+        window.harness.input_mut().events.push(Event::Text(typed.to_owned()));
+        window.step();
+        window.press(Modifiers::NONE, Key::Enter);
+        wait(&mut window);
+        assert_eq!(end(&mut window), Some(expected), "{typed}");
+    }
+    assert!(window.shows("to 0.0025, as given"));
+    choose(&mut window, "Automatic");
+    assert_eq!(end(&mut window), None);
+    assert!(window.shows("to 0.1, automatic"));
 }
 
 /// Only the left button is for the line of the wipe.
