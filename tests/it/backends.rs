@@ -336,6 +336,7 @@ fn first_radii_are_chosen_from_the_same_distances() {
     let one_place = vec![all[0]; 300];
     let flat: Vec<Photon> = all.iter().map(|p| Photon { position: [p.position[0], 0.25, 0.0], ..*p }).collect();
     gpu.set_eye_vertices(&vertices).expect("room");
+    gpu.set_reaches_on_device(true);
     for photons in [&all[..0], &all[..9], &all[..10], &all[..23], &one_place, &flat[..500], &all] {
         let stages: [&mut dyn Stages; 2] = [&mut cpu, &mut gpu];
         let [on_cpu, on_gpu] = stages.map(|stages| {

@@ -81,6 +81,7 @@ pub struct GpuStages {
     /// In pixels.
     eye_pace: Pace,
     reach_pace: Pace,
+    reaches_on_device: bool,
     gather_pace: Pace,
     /// A photon takes the device to sort, in each part of that; none before the first.
     photon_seconds: Option<f64>,
@@ -123,6 +124,7 @@ impl GpuStages {
         let find_reaches = modules.kernel("reaches", "find_reaches", &[Read, Read, Read, Read, Write])?;
         let accumulate = modules.kernel("accumulate", "accumulate", &[Read, Write])?;
         let timer = Timer::new(&context);
+        let reaches_on_device = context.info().kind != DeviceKind::Cpu;
         let mut stages = Self {
             context,
             shared,
@@ -150,6 +152,7 @@ impl GpuStages {
             n_iterations: 0,
             eye_pace: Pace::new(1, MOST_PIXELS),
             reach_pace: Pace::new(1, MOST_PIXELS),
+            reaches_on_device,
             gather_pace: Pace::new(1, MOST_PIXELS),
             photon_seconds: None,
             dispatch_seconds: DISPATCH_SECONDS,
@@ -159,11 +162,18 @@ impl GpuStages {
     }
 
     /// How long one dispatch of eye paths, photon paths or the gather is to take at most, seconds (if never called 0.1, or
-    /// 0.004 with an interrupt, on software 0.01): short ones let whoever shares the device have a turn. It is aimed at from what those before
-    /// took, down to a smallest dispatch, and changes no bit of the picture.
+    /// 0.004 with an interrupt, on software 0.01): short ones let whoever shares the device have a turn. It is aimed at from
+    /// what those before took, down to a smallest dispatch, and changes no bit of the picture.
     pub fn set_dispatch_seconds(&mut self, seconds: f64) {
         self.dispatch_seconds = seconds.max(0.0);
         self.begin_paces();
+    }
+
+    /// Whether the device itself finds what first radii are chosen from, or the processor does, from all that is read back (if
+    /// never called, only for software, which reads back at no cost and takes two and a half times as long itself). Where ray
+    /// queries search, the processor does in any case. It changes the radii by rounding at most.
+    pub fn set_reaches_on_device(&mut self, on_device: bool) {
+        self.reaches_on_device = on_device;
     }
 
     /// Nothing is known of what is next.
@@ -186,6 +196,34 @@ impl GpuStages {
     pub fn tree(&mut self) -> Result<Vec<PointBox>, Error> {
         let n = self.index.levels.last().map_or(0, |[first, n]| first + n);
         self.read(Source::Boxes, n)
+    }
+
+    fn find_reaches(&mut self, frame: &Frame) -> Result<Vec<Reach>, Error> {
+        self.check_pixels(frame)?;
+        self.build_index(frame)?;
+        let mut reaches = Array::in_ranges::<Reach>("distances to photons");
+        reaches.reserve(&self.context, u64::from(self.n_pixels))?;
+        let mut batch = Batch::new(&self.context, &self.shared, "distances to photons");
+        self.scene.set_frame(&batch, frame);
+        let mut next = Rows::new(frame, 0, self.reach_pace.amount());
+        while let Some(rows) = next {
+            let buffers = [
+                rows.of(&self.eye_vertices),
+                self.photons.all(),
+                self.index.nodes.all(),
+                self.index.boxes.all(),
+                rows.of(&reaches),
+            ];
+            let n_levels = self.index.levels.len() as u32;
+            let arguments = self.index.arguments([rows.n, self.n_photons, n_levels, rows.skipped()]);
+            batch.dispatch(&self.find_reaches, &buffers, arguments, rows.workgroups());
+            if rows.end() < frame.height {
+                self.reach_pace.learn(batch.cut(rows.pixels())?);
+            }
+            next = Rows::new(frame, rows.end(), self.reach_pace.amount());
+        }
+        batch.submit()?;
+        Ok(self.readback.read(&self.context, &self.shared, reaches.raw(), self.n_pixels as usize)?)
     }
 
     /// Asks the BSDF of the shaders: for tests.
@@ -433,36 +471,13 @@ impl Stages for GpuStages {
     fn reaches(&mut self, frame: &Frame, step: usize) -> Result<Vec<Reach>, Error> {
         self.check_pixels(frame)?;
         // Ray queries have one radius for all, and no order.
-        if self.hardware.is_some() {
-            let (eye, photons) = (self.eye_vertices()?, self.photons()?);
-            let mut tree = PointBvh::default();
-            tree.rebuild(photons.len(), |i| photons[i].position.into());
-            return reaches(frame, &self.camera, &eye, &tree, step, &self.shared.interrupt);
+        if self.reaches_on_device && self.hardware.is_none() {
+            return self.find_reaches(frame);
         }
-        self.build_index(frame)?;
-        let mut reaches = Array::in_ranges::<Reach>("distances to photons");
-        reaches.reserve(&self.context, u64::from(self.n_pixels))?;
-        let mut batch = Batch::new(&self.context, &self.shared, "distances to photons");
-        self.scene.set_frame(&batch, frame);
-        let mut next = Rows::new(frame, 0, self.reach_pace.amount());
-        while let Some(rows) = next {
-            let buffers = [
-                rows.of(&self.eye_vertices),
-                self.photons.all(),
-                self.index.nodes.all(),
-                self.index.boxes.all(),
-                rows.of(&reaches),
-            ];
-            let n_levels = self.index.levels.len() as u32;
-            let arguments = self.index.arguments([rows.n, self.n_photons, n_levels, rows.skipped()]);
-            batch.dispatch(&self.find_reaches, &buffers, arguments, rows.workgroups());
-            if rows.end() < frame.height {
-                self.reach_pace.learn(batch.cut(rows.pixels())?);
-            }
-            next = Rows::new(frame, rows.end(), self.reach_pace.amount());
-        }
-        batch.submit()?;
-        Ok(self.readback.read(&self.context, &self.shared, reaches.raw(), self.n_pixels as usize)?)
+        let (eye, photons) = (self.eye_vertices()?, self.photons()?);
+        let mut tree = PointBvh::default();
+        tree.rebuild(photons.len(), |i| photons[i].position.into());
+        reaches(frame, &self.camera, &eye, &tree, step, &self.shared.interrupt)
     }
 
     fn set_first_radii(&mut self, radii: &[f32]) -> Result<(), Error> {
