@@ -19,7 +19,7 @@ use sunfleck::cpu::{CpuStages, camera};
 use sunfleck::layout;
 use sunfleck::math::{rng, warp};
 use sunfleck::ppm::{self, Params, StageTimes, Stages};
-use sunfleck::scene::{Accelerator, PackedScene, shipped};
+use sunfleck::scene::{Accelerator, Material, PackedScene, Scene, shipped};
 
 #[derive(Parser)]
 #[command(about = "Times every stage of an iteration")]
@@ -42,6 +42,9 @@ struct Args {
     /// Iterations not counted, first
     #[arg(long, default_value_t = 2)]
     warm_up: u32,
+    /// What finds the distances of first radii for a GPU: `device`, `host` [default: as a render does]
+    #[arg(long, value_parser = ["device", "host"])]
+    reaches: Option<String>,
     /// CPU threads [default: all]
     #[arg(long, default_value_t = 0)]
     threads: usize,
@@ -71,6 +74,7 @@ fn main() -> Result<()> {
         let packed = Arc::new(PackedScene::new(&scene));
         let (seconds, bytes) = (start.elapsed().as_secs_f64(), size_of_val(&*packed.nodes));
         println!("{name}, packed with its BVH in {:.1} ms, nodes {bytes} bytes", 1e3 * seconds);
+        rows.push(json!({ "scene": name, "packMilliseconds": 1e3 * seconds, "packAgainMilliseconds": changes(&scene, &packed) }));
         let mut kd = None;
         if args.backend.iter().any(|b| b == "cpu-kd") {
             let unaccelerated = PackedScene::clone(&packed);
@@ -90,7 +94,7 @@ fn main() -> Result<()> {
                     "cpu-kd" => {
                         kd.as_ref().map(|kd| Box::new(CpuStages::new(kd.clone(), camera, size)) as Box<dyn Stages>)
                     }
-                    "gpu" => gpu(&packed, camera),
+                    "gpu" => gpu(&packed, camera, args.reaches.as_deref()),
                     other => bail!("no backend {other}"),
                 };
                 backends.extend(stages);
@@ -104,15 +108,44 @@ fn main() -> Result<()> {
     Ok(())
 }
 
+/// Milliseconds to pack the scene again once a material is rougher, and once it shines; medians.
+fn changes(scene: &Scene, packed: &PackedScene) -> [f64; 2] {
+    let mut changed = scene.clone();
+    let mut time = |change: fn(&mut Material)| {
+        changed.materials.iter_mut().take(1).for_each(change);
+        let times = (0..9).map(|_| {
+            let start = Instant::now();
+            black_box(PackedScene::new_after(packed, &changed));
+            1e3 * start.elapsed().as_secs_f64()
+        });
+        median(times.collect())
+    };
+    let times = [time(|m| m.roughness = 0.5 * m.roughness + 0.25), time(|m| m.emission += 1.0)];
+    println!(
+        "  packed again with a rougher material in {:.2} ms, with one that shines in {:.2} ms",
+        times[0], times[1]
+    );
+    times
+}
+
+fn median(mut times: Vec<f64>) -> f64 {
+    times.sort_by(f64::total_cmp);
+    times[times.len() / 2]
+}
+
 #[cfg(feature = "gpu")]
-fn gpu(packed: &PackedScene, camera: sunfleck::layout::Camera) -> Option<Box<dyn Stages>> {
+fn gpu(packed: &PackedScene, camera: sunfleck::layout::Camera, reaches: Option<&str>) -> Option<Box<dyn Stages>> {
     use sunfleck::gpu::{Choice, Context, GpuStages};
     let stages = Context::new(&Choice::Any).and_then(|c| GpuStages::new(Arc::new(c), packed, camera));
-    stages.map_err(|e| println!("no GPU: {e}")).ok().map(|s| Box::new(s) as Box<dyn Stages>)
+    let mut stages = stages.map_err(|e| println!("no GPU: {e}")).ok()?;
+    if let Some(reaches) = reaches {
+        stages.set_reaches_on_device(reaches == "device");
+    }
+    Some(Box::new(stages))
 }
 
 #[cfg(not(feature = "gpu"))]
-fn gpu(_: &PackedScene, _: sunfleck::layout::Camera) -> Option<Box<dyn Stages>> {
+fn gpu(_: &PackedScene, _: sunfleck::layout::Camera, _: Option<&str>) -> Option<Box<dyn Stages>> {
     println!("built without the GPU backend");
     None
 }
@@ -152,10 +185,7 @@ fn rays(scenes: [&PackedScene; 2], camera: &layout::Camera, size: [u32; 2]) -> V
                 times.push(1e9 * start.elapsed().as_secs_f64() / rays.len().max(1) as f64);
             }
         }
-        let [bvh, kd] = times.map(|mut times: Vec<f64>| {
-            times.sort_by(f64::total_cmp);
-            times[ROUNDS / 2]
-        });
+        let [bvh, kd] = times.map(median);
         println!("  {what:<16} bvh {bvh:7.0} ns, kd {kd:7.0} ns, {:.2}", kd / bvh);
         found.insert(what.into(), json!({ "bvh": bvh, "kd": kd, "rays": rays.len() }));
     }
@@ -164,8 +194,13 @@ fn rays(scenes: [&PackedScene; 2], camera: &layout::Camera, size: [u32; 2]) -> V
 
 fn measure(args: &Args, scene: &str, params: &Params, mut backends: Vec<Box<dyn Stages>>) -> Result<Vec<Value>> {
     let mut times: Vec<Vec<StageTimes>> = vec![Vec::new(); backends.len()];
-    for stages in &mut backends {
-        ppm::start(stages.as_mut(), params)?;
+    let mut starts = vec![Vec::new(); backends.len()];
+    for _ in 0..5 {
+        for (stages, starts) in backends.iter_mut().zip(&mut starts) {
+            let start = Instant::now();
+            ppm::start(stages.as_mut(), params)?;
+            starts.push(1e3 * start.elapsed().as_secs_f64());
+        }
     }
     for i in 1..=args.warm_up + args.iterations {
         for (stages, times) in backends.iter_mut().zip(&mut times) {
@@ -176,7 +211,7 @@ fn measure(args: &Args, scene: &str, params: &Params, mut backends: Vec<Box<dyn 
         }
     }
     let mut rows = Vec::new();
-    for (stages, times) in backends.iter().zip(&times) {
+    for ((stages, times), starts) in backends.iter().zip(&times).zip(starts) {
         type Of = fn(&StageTimes) -> f64;
         let stage_names: [(&str, Of); 6] = [
             ("eye", |t| t.eye),
@@ -187,9 +222,10 @@ fn measure(args: &Args, scene: &str, params: &Params, mut backends: Vec<Box<dyn 
             ("total", StageTimes::total),
         ];
         println!("{scene}, {} paths, {} photons stored, {}", params.n_paths, stages.n_photons(), stages.device());
+        let of_stages = stage_names.map(|(stage, of)| (stage, times.iter().map(|t| 1e3 * of(t)).collect()));
         let mut milliseconds = serde_json::Map::new();
-        for (stage, of) in stage_names {
-            let mut values: Vec<f64> = times.iter().map(|t| 1e3 * of(t)).collect();
+        // The pilot and the first radii, before the first iteration.
+        for (stage, mut values) in [("start", starts)].into_iter().chain(of_stages) {
             values.sort_by(f64::total_cmp);
             let median = values.get(values.len() / 2).copied().context("--iterations is 0")?;
             let (least, most) = (values[0], values[values.len() - 1]);

@@ -24,6 +24,7 @@ pub enum Device {
         context: Arc<Context>,
         method: Method,
         /// Of `--device`, if it was asked for by that.
+        #[cfg_attr(not(feature = "view"), expect(dead_code, reason = "only the window tells how it was chosen"))]
         named: Option<String>,
     },
 }

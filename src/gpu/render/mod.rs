@@ -60,7 +60,6 @@ pub struct GpuStages {
     index: Index,
     /// What searches instead of the index's tree; the photons are in its order all the same.
     hardware: Option<Hardware>,
-    find_reaches: Arc<Kernel>,
     gather: Arc<Kernel>,
     accumulate: Arc<Kernel>,
     eye_vertices: Array,
@@ -121,7 +120,6 @@ impl GpuStages {
                 (modules.kernel("gather_hardware", "gather", &bindings)?, Some(hardware))
             }
         };
-        let find_reaches = modules.kernel("reaches", "find_reaches", &[Read, Read, Read, Read, Write])?;
         let accumulate = modules.kernel("accumulate", "accumulate", &[Read, Write])?;
         let timer = Timer::new(&context);
         let reaches_on_device = context.info().kind != DeviceKind::Cpu;
@@ -134,7 +132,6 @@ impl GpuStages {
             paths,
             index,
             hardware,
-            find_reaches,
             gather,
             accumulate,
             eye_vertices: Array::in_ranges::<EyeVertex>("eye vertices"),
@@ -199,7 +196,12 @@ impl GpuStages {
     }
 
     fn find_reaches(&mut self, frame: &Frame) -> Result<Vec<Reach>, Error> {
+        use Access::{Read, Write};
         self.check_pixels(frame)?;
+        // Made when it is first needed: software never does.
+        let modules = Modules::new(&self.context, &self.shared);
+        let bindings = [Read, Read, Read, Read, Write];
+        let kernel = self.context.guarded(|| modules.kernel("reaches", "find_reaches", &bindings))?;
         self.build_index(frame)?;
         let mut reaches = Array::in_ranges::<Reach>("distances to photons");
         reaches.reserve(&self.context, u64::from(self.n_pixels))?;
@@ -216,7 +218,7 @@ impl GpuStages {
             ];
             let n_levels = self.index.levels.len() as u32;
             let arguments = self.index.arguments([rows.n, self.n_photons, n_levels, rows.skipped()]);
-            batch.dispatch(&self.find_reaches, &buffers, arguments, rows.workgroups());
+            batch.dispatch(&kernel, &buffers, arguments, rows.workgroups());
             if rows.end() < frame.height {
                 self.reach_pace.learn(batch.cut(rows.pixels())?);
             }
