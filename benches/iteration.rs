@@ -72,7 +72,7 @@ fn main() -> Result<()> {
         let camera = scene.cameras.first().context("no camera")?.pack(size[0], size[1]);
         let start = Instant::now();
         let packed = Arc::new(PackedScene::new(&scene));
-        let (seconds, bytes) = (start.elapsed().as_secs_f64(), size_of_val(&*packed.nodes));
+        let (seconds, bytes) = (start.elapsed().as_secs_f64(), size_of_val(packed.nodes.as_slice()));
         println!("{name}, packed with its BVH in {:.1} ms, nodes {bytes} bytes", 1e3 * seconds);
         rows.push(json!({ "scene": name, "packMilliseconds": 1e3 * seconds, "packAgainMilliseconds": changes(&scene, &packed) }));
         let mut kd = None;

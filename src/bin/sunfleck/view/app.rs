@@ -25,6 +25,8 @@ use crate::scenes::Source;
 
 /// Key of what is remembered, where it was in eframe's file.
 const REMEMBERED: &str = "remembered";
+/// Seconds an iteration takes, from which on whatever changes the picture shows a preview first: a whole one would be waited for.
+const PREVIEW_FROM: f64 = 0.25;
 /// Width of a window with panels on either side of the picture, points.
 const LEAST_FOR_BOTH: f32 = 720.0;
 /// Width of the picture between them, points.
@@ -117,6 +119,9 @@ pub struct Viewer {
     last_save: LastSave,
     pub convergence: super::convergence::Convergence,
     pub timing: super::timing::Timing,
+    /// Of the last estimate that was no preview; one that takes this long or longer is preceded by a preview.
+    iteration_seconds: f64,
+    pub preview_from: f64,
     /// What was open before.
     pub previous: Option<Arc<Choice>>,
     /// Of [`First`].
@@ -163,6 +168,8 @@ impl Viewer {
             last_save: LastSave::default(),
             convergence: Default::default(),
             timing: Default::default(),
+            iteration_seconds: 0.0,
+            preview_from: PREVIEW_FROM,
             previous: None,
             always: first.always,
             limits: LimitsOfScenes::new(first.limits),
@@ -484,9 +491,14 @@ impl Viewer {
         super::help::show(ui, self);
         self.messages.show(ui);
         self.wanted.painting.look = self.look();
-        if is_other_scene(&wanted, &self.wanted)
-            || self.editing.as_ref().is_some_and(|opened| is_asked_anew(opened, &wanted, &self.wanted))
-        {
+        let asks_anew = self.editing.as_ref().is_some_and(|opened| is_asked_anew(opened, &wanted, &self.wanted));
+        if asks_anew && wanted.restarts == self.wanted.restarts && self.iteration_seconds >= self.preview_from {
+            // Soon, and again to see that it rests.
+            self.picture.move_on(ui.input(|i| i.time));
+            self.wanted.moving = true;
+            ui.ctx().request_repaint_after_secs(0.03);
+        }
+        if is_other_scene(&wanted, &self.wanted) || asks_anew {
             self.timing.ask(began, self.now.estimate);
         }
         self.engine.want(&self.wanted);
@@ -503,6 +515,9 @@ impl Viewer {
             // Left of a scene that is not wanted any more, until a stage of it comes to its end.
             (self.now.opened, self.now.frame, self.now.painted) = (None, None, None);
             self.now.phase = if self.wanted.scene.is_some() { Phase::Loading } else { Phase::Empty };
+        }
+        if let Some(frame) = self.now.frame.as_ref().filter(|frame| !frame.is_preview) {
+            self.iteration_seconds = frame.seconds / f64::from(frame.film.n_iterations.max(1));
         }
         if let Some(painted) = &self.now.painted {
             self.timing.see(Instant::now(), painted.frame.estimate);

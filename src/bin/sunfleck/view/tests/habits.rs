@@ -452,6 +452,32 @@ fn shortcuts_work_whatever_has_the_focus() {
 }
 
 #[test]
+fn a_change_shows_a_preview_first_where_iterations_are_slow() {
+    let mut window = Window::with_picture();
+    let changes = [(Modifiers::NONE, Key::Plus), (Modifiers::COMMAND, Key::Z), (Modifiers::COMMAND, Key::Y)];
+    for (modifiers, key) in changes {
+        window.press(modifiers, key);
+        assert!(!window.viewer().wanted.moving, "{key:?}");
+    }
+    window.wait_for_picture();
+    window.viewer().preview_from = 0.0;
+    for (modifiers, key) in changes {
+        let estimate = window.viewer().now.estimate;
+        window.press(modifiers, key);
+        assert!(window.viewer().wanted.moving, "{key:?}");
+        window.wait("preview", |viewer| {
+            viewer.picture.painted().is_some_and(|p| p.frame.is_preview && p.frame.estimate > estimate)
+        });
+        window.wait_for_picture();
+    }
+    // What changes nothing, or asks for the same once more.
+    for key in [Key::E, Key::Space, Key::V] {
+        window.press(Modifiers::NONE, key);
+        assert!(!window.viewer().wanted.moving, "{key:?}");
+    }
+}
+
+#[test]
 fn limits_wait_for_the_whole_number() {
     let mut window = Window::with_picture();
     let before = window.viewer().wanted.limits;

@@ -74,6 +74,8 @@ impl Window {
         let first =
             First { choice: scene.map(|name| Choice { name: name.to_owned(), set }), limits, ..First::default() };
         let mut viewer = Viewer::new(engine(), Arc::new(|| {}), first);
+        // However slow the machine.
+        viewer.preview_from = f64::INFINITY;
         let asked = Arc::new(Mutex::new(vec![]));
         let (noted, place) = (Arc::clone(&asked), folder.path().to_owned());
         viewer.pick = Arc::new(move |purpose, _| {
