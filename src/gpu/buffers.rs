@@ -55,6 +55,12 @@ impl Array {
         Ok(())
     }
 
+    /// Gives its memory back.
+    #[cfg(feature = "render")]
+    pub(super) fn free(&mut self) {
+        self.buffer = None;
+    }
+
     /// The buffer; call [`Array::reserve`] first.
     pub(super) fn raw(&self) -> &wgpu::Buffer {
         &self.buffer.as_ref().expect("reserved before use").raw

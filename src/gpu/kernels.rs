@@ -341,7 +341,8 @@ impl<'a> Batch<'a> {
             .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(kernel.name), timestamp_writes: None });
         pass.set_pipeline(&kernel.pipeline);
         pass.set_bind_group(0, &group, &[]);
-        for (i, shared) in self.shared.groups[..kernel.n_groups].iter().enumerate() {
+        // Without those of a scene that could not be set, that is an error of the dispatch.
+        for (i, shared) in self.shared.groups.iter().take(kernel.n_groups).enumerate() {
             let offsets: &[u32] = if i == 0 { &[offset as u32] } else { &[] };
             pass.set_bind_group(i as u32 + 1, &shared.group, offsets);
         }

@@ -57,7 +57,8 @@ pub trait Stages {
     /// is that of stages made anew.
     fn set_camera(&mut self, camera: Camera, film_size: [u32; 2]) -> Result<(), Error>;
 
-    /// Another scene: [`Stages::set_camera`] comes next. What it shares with the last one stays where it is.
+    /// Another scene: [`Stages::set_camera`] comes next. What it shares with the last one stays where it is. After an error, stages
+    /// fail until one could be set.
     fn set_scene(&mut self, scene: &Arc<PackedScene>) -> Result<(), Error>;
 
     /// What ends a stage early from now on.

@@ -57,7 +57,8 @@ impl PackedScene {
     }
 
     /// The same. What of the scene is the very same as that which `before` was packed from (the same meshes and images behind
-    /// their `Arc`s) is shared with it: materials and lights change at little cost.
+    /// their `Arc`s) is shared with it: materials and lights change at little cost. The arrays of `before` must be as they were
+    /// packed.
     pub fn new_after(before: &Self, scene: &Scene) -> Self {
         Self::pack(scene, before)
     }
@@ -198,7 +199,10 @@ mod tests {
         let mut scene = crate::scene::shipped::shipped("cornell").expect("it is shipped");
         scene.environment = Some(Environment::uniform(Vec3::ONE));
         scene.images = vec![Image { name: String::new(), width: 1, height: 2, texels: vec![[9; 4]; 2] }.into()];
-        scene.spheres.push(Sphere { centre: Vec3::Y, radius: 0.25, inward: false, material: 0 });
+        scene.spheres.insert(0, Sphere { centre: Vec3::Y, radius: 0.25, inward: false, material: 0 });
+        let mesh = Arc::make_mut(&mut scene.meshes[0]);
+        mesh.uv0 = mesh.positions.iter().map(|p| p.truncate() + p.z).collect();
+        mesh.uv1 = mesh.positions.iter().map(|p| p.truncate() * 2.0 - p.z).collect();
         scene
     }
 
@@ -231,6 +235,13 @@ mod tests {
         }
         let one_sided = after(&scene);
         assert_eq!(shared(&one_sided, &before), [true, false, true, true, true]);
+        // Of a sphere too, and of which material it is.
+        (scene.spheres[0].inward, scene.spheres[0].material) = (true, 1);
+        let turned = after(&scene);
+        assert_eq!(shared(&turned, &before), [true, false, true, true, true]);
+        let back = PackedScene::new_after(&one_sided, &scene);
+        assert_eq!(shared(&back, &one_sided), [true, false, true, true, true]);
+        scene.spheres[0] = Sphere { inward: false, material: 0, ..scene.spheres[0] };
         let back = PackedScene::new_after(&one_sided, &scene);
         assert_eq!(shared(&back, &one_sided), [true; 5]);
     }
@@ -239,6 +250,18 @@ mod tests {
     fn what_moves_or_vanishes_is_packed_anew() {
         let mut scene = scene();
         let before = PackedScene::new(&scene).accelerated(Accelerator::Kd).expect("it has a kd-tree");
+        // Of which mesh 0 is.
+        let bumpy = |scene: &mut Scene, uv_set| {
+            let of = scene.meshes[0].material;
+            scene.materials[of].normal_texture = Some(Texture { uv_set, ..Texture::new(0) });
+        };
+        for uv_set in [0, 1] {
+            let before = PackedScene::new(&scene);
+            bumpy(&mut scene, uv_set);
+            let after = PackedScene::new_after(&before, &scene);
+            assert_same(&after, &PackedScene::new(&scene));
+            assert!(!shared(&after, &before)[0]);
+        }
         let changes: [fn(&mut Scene); 7] = [
             |scene| scene.materials[0].alpha = AlphaMode::Mask(1.5),
             |scene| Arc::make_mut(&mut scene.meshes[0]).positions[0] += 9.0,

@@ -328,8 +328,12 @@ fn the_same_seed_gives_the_same_bits_on_the_gpu() {
 /// The tenth nearest photon is as far away as brute force says, however many there are.
 #[test]
 fn first_radii_are_chosen_from_the_same_distances() {
-    let Some((mut cpu, mut gpu)) = backends(&everything()) else { return };
-    let frame = params().frame(0);
+    let Some(context) = context() else { return };
+    let (scene, [width, height]) = (everything(), [97, 61]);
+    let (packed, camera) = (Arc::new(PackedScene::new(&scene)), scene.cameras[0].pack(width, height));
+    let mut gpu = GpuStages::new(context, &packed, camera).expect("stages");
+    let mut cpu = CpuStages::new(packed, camera, [width, height]);
+    let frame = Params { n_paths: 40_000, ..Params::new(width, height) }.frame(0);
     cpu.trace_eye(&frame).expect("eye paths");
     cpu.trace_photons(&frame).expect("photons");
     let (vertices, all) = (cpu.eye_vertices().expect("vertices"), cpu.photons().expect("photons"));
@@ -337,6 +341,8 @@ fn first_radii_are_chosen_from_the_same_distances() {
     let flat: Vec<Photon> = all.iter().map(|p| Photon { position: [p.position[0], 0.25, 0.0], ..*p }).collect();
     gpu.set_eye_vertices(&vertices).expect("room");
     gpu.set_reaches_on_device(true);
+    // As many dispatches as there can be.
+    gpu.set_dispatch_seconds(0.0);
     for photons in [&all[..0], &all[..9], &all[..10], &all[..23], &one_place, &flat[..500], &all] {
         let stages: [&mut dyn Stages; 2] = [&mut cpu, &mut gpu];
         let [on_cpu, on_gpu] = stages.map(|stages| {
@@ -376,7 +382,8 @@ fn camera_can_be_replaced<S: Stages>(mut make: impl FnMut(layout::Camera, [u32; 
     let first = Params { n_paths: 40_000, ..Params::new(SIZE, SIZE) };
     let mut stages = make(from(0.5).pack(SIZE, SIZE), first.film_size());
     film_bits(&mut stages, &first);
-    for (x, [width, height]) in [(-1.0, [24, 16]), (1.5, [120, 80])] {
+    // Of the last, dispatches begin anywhere in a workgroup's pixels.
+    for (x, [width, height]) in [(-1.0, [24, 16]), (1.5, [120, 80]), (1.0, [61, 37])] {
         let params = Params { crop: [3, 2, width, height], n_paths: 40_000, ..Params::new(width, height) };
         let camera = from(x).pack(width, height);
         stages.set_camera(camera, params.film_size()).expect("room");
@@ -414,7 +421,7 @@ fn scene_can_be_replaced(mut film: impl FnMut(&Arc<PackedScene>, layout::Camera,
     let camera = scene.cameras[0].pack(24, 16);
     let mut packed = Arc::new(PackedScene::new(&scene));
     let mut before = film(&packed, camera, &params, false);
-    let changes: [fn(&mut Scene); 8] = [
+    let changes: [fn(&mut Scene); 10] = [
         |scene| scene.materials[0].base_color = Vec3::new(0.1, 0.2, 0.9),
         |scene| scene.materials[3].emission = Vec3::splat(2.0),
         |scene| scene.environment.as_mut().expect("it has one").strength = 0.5,
@@ -423,6 +430,8 @@ fn scene_can_be_replaced(mut film: impl FnMut(&Arc<PackedScene>, layout::Camera,
         |scene| scene.spheres[2].radius = 0.7,
         |scene| Arc::make_mut(&mut scene.meshes[1]).positions.iter_mut().for_each(|at| at.x -= 1.0),
         |scene| scene.lights.clear(),
+        |scene| scene.environment = None,
+        |scene| scene.images[0] = noise_image("small", 2, 2).into(),
     ];
     for (i, change) in changes.into_iter().enumerate() {
         change(&mut scene);
@@ -470,6 +479,49 @@ fn replaced<S: Stages>(
         Some(_) => film_bits(&mut made, params),
         None => film_bits(first.insert(made), params),
     }
+}
+
+/// And what could not be set does no harm.
+#[test]
+fn a_scene_that_could_not_be_set_can_be_followed_by_another() {
+    let Some(context) = context() else { return };
+    let n = context.most_bytes_bound() / 4 + 1;
+    if n > 1 << 27 {
+        println!("skipped: the adapter binds more than this test wants to allocate");
+        return;
+    }
+    let params = Params { n_paths: 4_000, ..Params::new(24, 16) };
+    let scene = everything();
+    let camera = scene.cameras[0].pack(24, 16);
+    let packed = Arc::new(PackedScene::new(&scene));
+    let mut stages = GpuStages::new(context, &packed, camera).expect("stages");
+    let before = film_bits(&mut stages, &params);
+    let mut too_large = PackedScene::clone(&packed);
+    too_large.texels = vec![0; n as usize].into();
+    assert!(stages.set_scene(&Arc::new(too_large)).is_err());
+    stages.set_camera(camera, params.film_size()).expect("room");
+    assert!(stages.trace_eye(&params.frame(1)).is_err(), "there is no scene");
+    stages.set_scene(&packed).expect("room");
+    stages.set_camera(camera, params.film_size()).expect("room");
+    assert!(film_bits(&mut stages, &params) == before);
+}
+
+/// A map that does not shine is not taken to the device, which has no room for this one.
+#[test]
+fn a_dark_environment_takes_no_room() {
+    let Some(context) = context() else { return };
+    let width = 4096;
+    let height = (context.most_bytes_bound() / 16 / width + 1) as u32;
+    if height > 4096 {
+        println!("skipped: the adapter binds more than this test wants to allocate");
+        return;
+    }
+    let texels = Arc::new(vec![Vec3::ONE; width as usize * height as usize]);
+    let map = |strength| Environment { width: width as u32, height, texels: texels.clone(), rotation: 0.0, strength };
+    let packed = |strength| PackedScene::new(&Scene { environment: Some(map(strength)), ..everything() });
+    let stages = |strength| GpuStages::new(context.clone(), &packed(strength), layout::Camera::default());
+    assert!(stages(0.0).is_ok());
+    assert!(matches!(stages(1.0), Err(Error::TooLarge { .. })));
 }
 
 #[test]

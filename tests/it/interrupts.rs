@@ -28,6 +28,7 @@ fn on_the_gpu() -> Option<GpuStages> {
     let camera = scene.cameras[0].pack(SIZE[0], SIZE[1]);
     let mut stages = GpuStages::new(context()?, &PackedScene::new(&scene), camera).expect("stages");
     stages.set_dispatch_seconds(0.0);
+    stages.set_reaches_on_device(true);
     Some(stages)
 }
 

@@ -168,7 +168,8 @@ impl GpuStages {
 
     /// Whether the device itself finds what first radii are chosen from, or the processor does, from all that is read back (if
     /// never called, only for software, which reads back at no cost and takes two and a half times as long itself). Where ray
-    /// queries search, the processor does in any case. It changes the radii by rounding at most.
+    /// queries search, the processor does in any case. It changes the radii by rounding at most, but for those of previews: the
+    /// processor searches around some of their pixels only.
     pub fn set_reaches_on_device(&mut self, on_device: bool) {
         self.reaches_on_device = on_device;
     }
@@ -197,8 +198,7 @@ impl GpuStages {
 
     fn find_reaches(&mut self, frame: &Frame) -> Result<Vec<Reach>, Error> {
         use Access::{Read, Write};
-        self.check_pixels(frame)?;
-        // Made when it is first needed: software never does.
+        // Made when it is first needed: software does without.
         let modules = Modules::new(&self.context, &self.shared);
         let bindings = [Read, Read, Read, Read, Write];
         let kernel = self.context.guarded(|| modules.kernel("reaches", "find_reaches", &bindings))?;
@@ -327,10 +327,13 @@ impl Stages for GpuStages {
 
     fn set_scene(&mut self, scene: &Arc<PackedScene>) -> Result<(), Error> {
         let context = Arc::clone(&self.context);
+        // They hold the memory of what they bind.
+        self.shared.set_groups([]);
         context.guarded(|| {
             self.shared.set_groups(self.scene.set(&context, scene)?);
             Ok(())
-        })
+        })?;
+        Ok(())
     }
 
     fn set_interrupt(&mut self, interrupt: Interrupt) {

@@ -8,7 +8,7 @@ use crate::device::Error;
 use crate::gpu::buffers::Array;
 use crate::gpu::context::Context;
 use crate::gpu::kernels::{Access, Batch, Group, storage, uniform};
-use crate::layout::{Camera, Frame, LIGHT_AREA, LIGHT_ENVIRONMENT, Primitive, SceneInfo, SceneNode, Vertex};
+use crate::layout::{Camera, Frame, LIGHT_AREA, LIGHT_ENVIRONMENT, NONE, Primitive, SceneInfo, SceneNode, Vertex};
 use crate::scene::PackedScene;
 
 /// Where things lie in the table of small things; twin of `Tables` in `shaders/lib/scene.wgsl`.
@@ -51,11 +51,14 @@ impl<T: Pod> Uploaded<T> {
         Self { array: Array::new::<T>(what), of: Weak::new() }
     }
 
-    /// Makes it one of `values`, if it is not.
+    /// Makes it one of `values`, if it is not; in no more than twice the memory that they need.
     fn set(&mut self, context: &Context, values: &Arc<Vec<T>>) -> Result<(), Error> {
         let of = Arc::downgrade(values);
         if !self.of.ptr_eq(&of) {
             self.of = Weak::new();
+            if self.array.capacity() > 2 * values.len() as u64 {
+                self.array.free();
+            }
             self.array.write(context, values)?;
             self.of = of;
         }
@@ -89,13 +92,18 @@ impl SceneBuffers {
             bytemuck::cast_slice_mut::<_, u8>(&mut table[first as usize..])[..bytes.len()].copy_from_slice(bytes);
             first
         };
+        // One that does not shine is not looked at.
+        let none = (Arc::default(), Arc::default());
+        let shines = scene.info.environment_light != NONE;
+        let (environment, rows) =
+            if shines { (&scene.environment, &scene.environment_rows) } else { (&none.0, &none.1) };
         let tables = Tables {
             n_nodes: scene.nodes.len() as u32,
             n_primitives: scene.primitives.len() as u32,
             materials: append(bytemuck::cast_slice(&scene.materials)),
             slots: append(bytemuck::cast_slice(&scene.slots)),
             lights: append(bytemuck::cast_slice(&scene.lights)),
-            environment_rows: append(bytemuck::cast_slice(&scene.environment_rows)),
+            environment_rows: append(bytemuck::cast_slice(rows)),
             albedo: append(bytemuck::cast_slice(&scene.albedo)),
             has_extended: u32::from(scene.lights.iter().any(|l| l.kind == LIGHT_AREA || l.kind == LIGHT_ENVIRONMENT)),
         };
@@ -103,7 +111,7 @@ impl SceneBuffers {
         self.primitives.set(context, &scene.primitives)?;
         self.vertices.set(context, &scene.vertices)?;
         self.texels.set(context, &scene.texels)?;
-        self.environment.set(context, &scene.environment)?;
+        self.environment.set(context, environment)?;
         self.table.write(context, &table)?;
         context.queue.write_buffer(&self.info, 0, bytemuck::bytes_of(&scene.info));
         context.queue.write_buffer(&self.tables, 0, bytemuck::bytes_of(&tables));

@@ -14,6 +14,7 @@ use crate::scene::{AlphaMode, Material, Mesh, Scene, Sphere, Texture, bvh};
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Object {
     shape: Shape,
+    material: usize,
     /// Of all its primitives; none if it is not there.
     flags: Option<u32>,
 }
@@ -26,14 +27,17 @@ enum Shape {
         /// Texture coordinates by which tangents are made.
         tangents: Option<u32>,
     },
-    Sphere(Sphere),
+    Sphere {
+        centre: Vec3,
+        radius: f32,
+    },
 }
 
 impl PartialEq for Shape {
     fn eq(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Mesh { mesh: a, tangents: t }, Self::Mesh { mesh: b, tangents: u }) => a.ptr_eq(b) && t == u,
-            (Self::Sphere(a), Self::Sphere(b)) => a == b,
+            (Self::Sphere { centre: a, radius: r }, Self::Sphere { centre: b, radius: s }) => a == b && r == s,
             _ => false,
         }
     }
@@ -52,7 +56,7 @@ impl Object {
         let shape = Shape::Mesh { mesh: Arc::downgrade(mesh), tangents };
         // No opacity reaches such a cut-off: glTF has the mesh vanish.
         if matches!(material.alpha, AlphaMode::Mask(cutoff) if cutoff > 1.0) {
-            return Self { shape, flags: None };
+            return Self { shape, material: mesh.material, flags: None };
         }
         let mut flags = side_flags(material);
         let vertex_alpha = mesh.colors.iter().any(|c| c.w < 1.0);
@@ -67,7 +71,7 @@ impl Object {
         if mesh.colors.is_empty() && !material.is_textured() {
             flags |= layout::PRIMITIVE_PLAIN;
         }
-        Self { shape, flags: Some(flags) }
+        Self { shape, material: mesh.material, flags: Some(flags) }
     }
 
     fn of_sphere(sphere: &Sphere, material: &Material) -> Self {
@@ -75,7 +79,8 @@ impl Object {
         if sphere.inward {
             flags |= layout::PRIMITIVE_INWARD;
         }
-        Self { shape: Shape::Sphere(*sphere), flags: Some(flags) }
+        let shape = Shape::Sphere { centre: sphere.centre, radius: sphere.radius };
+        Self { shape, material: sphere.material, flags: Some(flags) }
     }
 }
 
@@ -99,8 +104,9 @@ impl PackedScene {
         (self.primitives, self.kd) = (Arc::clone(&before.primitives), before.kd.clone());
         if self.objects != before.objects {
             for p in Arc::make_mut(&mut self.primitives) {
-                let flags = self.objects[p.object as usize].flags.unwrap_or(p.flags);
-                p.flags = flags | p.flags & layout::PRIMITIVE_MIRRORED_UV;
+                let object = &self.objects[p.object as usize];
+                p.material = object.material as u32;
+                p.flags = object.flags.unwrap_or(p.flags) | p.flags & layout::PRIMITIVE_MIRRORED_UV;
             }
         }
     }

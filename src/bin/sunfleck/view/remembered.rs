@@ -58,9 +58,13 @@ impl Remembered {
         };
         let n_opened = (0..self.recent.len()).find(|&n| follows(&self.recent[n..])).unwrap_or(self.recent.len());
         let opened = &self.recent[..n_opened];
-        // Of a full list, what is missing had no room.
-        let has_room = self.recent.len() < MOST_RECENT;
-        let is_forgotten = |path| has_room && before.recent.contains(path) && !self.recent.contains(path);
+        // At the end of a full list, what is missing had no room.
+        let was_left = |path| !self.recent.contains(path);
+        let n_kept = match self.recent.len() < MOST_RECENT {
+            true => before.recent.len(),
+            false => before.recent.iter().rposition(|path| !was_left(path)).map_or(0, |last| last + 1),
+        };
+        let is_forgotten = |path| before.recent[..n_kept].contains(path) && was_left(path);
         let rest = others.recent.iter().filter(|path| !opened.contains(path) && !is_forgotten(path));
         Self {
             recent: opened.iter().chain(rest).take(MOST_RECENT).cloned().collect(),
@@ -256,6 +260,7 @@ mod tests {
             // No room.
             (twelve, "x a b c d e f g h i j k", "l a b c d e f g h i j k", "x l a b c d e f g h i j"),
             (twelve, "a c d e f g h i j k l", twelve, "a c d e f g h i j k l"),
+            (twelve, "x a c d e f g h i j k l", twelve, "x a c d e f g h i j k l"),
         ] {
             let found = of(now).merged(&of(before), &of(others));
             assert_eq!(found, of(merged), "{before:?} {now:?} {others:?}");

@@ -25,7 +25,6 @@ use anyhow::{Error, Result};
 use glam::Vec3;
 use sunfleck::output::Picture;
 use sunfleck::ppm::Interrupt;
-use sunfleck::scene::PackedScene;
 use sunfleck::scene::load::Loaded;
 use sunfleck::scene::settings::Settings;
 
@@ -130,8 +129,6 @@ pub struct Opened {
     pub read: Settings,
     /// As the file has it, before settings; the default camera is added if it has none.
     pub loaded: Loaded,
-    /// With the settings that it was opened with; empty if they cannot be applied.
-    pub packed: PackedScene,
     /// Least and greatest corner of the scene and of the spheres that its settings add, metres; those of a cube of side 1
     /// about the origin if there is nothing.
     pub bounds: [Vec3; 2],

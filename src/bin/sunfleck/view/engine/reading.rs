@@ -12,7 +12,7 @@ use sunfleck::scene::load::Loaded;
 
 use super::{Board, Choice, Opened, Shared, catch};
 use crate::cli::InputArgs;
-use crate::job::{self, Input};
+use crate::job;
 use crate::scenes::Source;
 
 /// Threads that read, at most, those that were left among them: each holds a scene.
@@ -69,8 +69,8 @@ impl Reader {
     }
 }
 
-/// Reads a scene and the settings that lie beside it, and builds its tree.
-pub fn open(choice: &Arc<Choice>, interrupt: &Interrupt) -> Result<Opened> {
+/// Reads a scene and the settings that lie beside it, and packs it with these, to be rendered `on_host` perhaps.
+pub fn open(choice: &Arc<Choice>, on_host: bool, interrupt: &Interrupt) -> Result<(Opened, PackedScene)> {
     let mut source = Source::resolve(&choice.name)?;
     let read = source.settings.clone();
     source.set(&choice.set)?;
@@ -82,15 +82,19 @@ pub fn open(choice: &Arc<Choice>, interrupt: &Interrupt) -> Result<Opened> {
     let stands_at = loaded.scene.cameras.first().map(|camera| Vec3::from(camera.world_from_camera.translation));
     let is_inside = stands_at.is_some_and(|at| at.clamp(bounds[0], bounds[1]) == at);
     let is_closed = !has_camera && is_inside;
-    let packed = pack(&source, &loaded);
-    Ok(Opened { choice: Arc::clone(choice), source, read, loaded, packed, bounds, is_closed })
+    // Of one that cannot be rendered as it is, nothing: whoever tries is told why.
+    let packed = pack(&source, &loaded, on_host, interrupt).unwrap_or_default();
+    Ok((Opened { choice: Arc::clone(choice), source, read, loaded, bounds, is_closed }, packed))
 }
 
-/// Nothing of a scene that cannot be rendered as it is: whoever tries is told why.
-fn pack(source: &Source, loaded: &Loaded) -> PackedScene {
-    let input = job::prepare(source, &source.settings, loaded.clone(), &InputArgs::default()).ok();
-    let has_room = |input: &Input| job::check_scene_memory(&input.scene).is_ok();
-    input.filter(has_room).map_or_else(PackedScene::default, |input| PackedScene::new(&input.scene))
+fn pack(source: &Source, loaded: &Loaded, on_host: bool, interrupt: &Interrupt) -> Result<PackedScene> {
+    let settings = &source.settings;
+    let input = job::prepare(source, settings, loaded.clone(), &InputArgs::default())?;
+    job::check_scene_memory(&input.scene)?;
+    interrupt.check()?;
+    let packed = PackedScene::new(&input.scene);
+    interrupt.check()?;
+    Ok(packed.accelerated(settings.accel.filter(|_| on_host).unwrap_or_default())?)
 }
 
 #[cfg(test)]

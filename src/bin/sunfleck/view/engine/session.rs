@@ -149,15 +149,16 @@ pub struct Session {
 }
 
 impl Session {
-    /// `interrupt` ends stages.
+    /// What `before` has of the scene is not packed again; `interrupt` ends stages.
     pub fn new(
         device: &Device,
         opened: Arc<Opened>,
         settings: Arc<Settings>,
         input: Input,
+        before: &PackedScene,
         interrupt: Interrupt,
     ) -> Result<Self> {
-        let scene = device.pack(&input.scene, &opened.packed)?;
+        let scene = device.pack(&input.scene, before)?;
         let mut stages = device.stages_of(Arc::clone(&scene), &input)?;
         stages.set_interrupt(interrupt);
         let params = input.params.clone();
@@ -182,6 +183,11 @@ impl Session {
             is_whole: false,
             shown: None,
         })
+    }
+
+    /// What it renders; the memory of the device is given back.
+    pub fn into_scene(self) -> Arc<PackedScene> {
+        self.scene
     }
 
     /// The same scene changed by other settings; [`Session::restart`] comes next. What stays of it is neither packed nor taken to
@@ -353,12 +359,12 @@ pub mod tests {
     /// A small one, of estimate 1, on the processor.
     pub fn session(interrupt: Interrupt) -> Session {
         let set = ["size=32x24", "photons=500"].map(str::to_owned).to_vec();
-        let opened =
-            reading::open(&Arc::new(Choice { name: "cornell".to_owned(), set }), &Interrupt::default()).unwrap();
+        let choice = Arc::new(Choice { name: "cornell".to_owned(), set });
+        let (opened, packed) = reading::open(&choice, true, &Interrupt::default()).unwrap();
         let settings = opened.source.settings.clone();
         let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default()).unwrap();
         let device = Device::Cpu(Accelerator::Bvh);
-        let mut session = Session::new(&device, opened.into(), settings.into(), input, interrupt).unwrap();
+        let mut session = Session::new(&device, opened.into(), settings.into(), input, &packed, interrupt).unwrap();
         session.restart(1, false).unwrap();
         session.start().unwrap();
         session

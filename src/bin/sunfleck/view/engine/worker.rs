@@ -6,7 +6,7 @@ use anyhow::{Context as _, Result};
 use sunfleck::layout;
 use sunfleck::ppm::{Error, Params};
 use sunfleck::scene::settings::{Index, Settings};
-use sunfleck::scene::{Accelerator, Scene};
+use sunfleck::scene::{Accelerator, PackedScene, Scene};
 
 use super::reading::{self, Reader};
 use super::session::Session;
@@ -21,6 +21,8 @@ struct Have {
     reader: Reader,
     session: Option<Session>,
     opened: Option<Arc<Opened>>,
+    /// That scene, for the first session of it; empty after.
+    packed: PackedScene,
     estimate: u64,
     steps_done: u32,
 }
@@ -47,6 +49,7 @@ pub fn run(shared: &Arc<Shared>, mut device: Device) {
         reader: Reader::default(),
         session: None,
         opened: None,
+        packed: PackedScene::default(),
         estimate: 0,
         steps_done: 0,
     };
@@ -127,11 +130,13 @@ impl Have {
             }));
             let Some(choice) = wanted.scene.clone() else { return Ok(()) };
             let is_left = |board: &Board| is_other_scene(wanted, &board.wanted);
-            let Some(opened) = self.reader.read(shared, move |interrupt| reading::open(&choice, interrupt), is_left)?
-            else {
+            let on_host = device.backend() == "cpu";
+            let read = move |interrupt: &_| reading::open(&choice, on_host, interrupt);
+            let Some((opened, packed)) = self.reader.read(shared, read, is_left)? else {
                 return Ok(());
             };
             let opened = Arc::new(opened);
+            self.packed = packed;
             self.opened = Some(Arc::clone(&opened));
             // As the interface will, when it sees the file.
             let mut wanted = wanted.clone();
@@ -160,6 +165,11 @@ impl Have {
         }
     }
 
+    /// Whether nobody wants the scene any more.
+    fn is_left(&self, board: &Board) -> bool {
+        board.quit || is_other_scene(&self.wanted, &board.wanted)
+    }
+
     /// Applies the settings, as far as possible to the scene that the device has.
     fn prepare(&mut self, shared: &Shared, device: &mut Device, wanted: &Wanted) -> Result<()> {
         let Some(opened) = self.opened.clone() else { return Ok(()) };
@@ -180,12 +190,16 @@ impl Have {
             }
             None => {
                 let input = job::prepare(&opened.source, &settings, opened.loaded.clone(), &InputArgs::default())?;
+                if self.is_left(&shared.board()) {
+                    // Nothing ends what comes.
+                    return Ok(());
+                }
                 let held = self.session.as_ref().map(|session| &session.input.params);
                 if held.is_none_or(|held| job::needs_more(&input.params, held)) {
                     job::check_memory(&input.params, held.filter(|_| on_host))?;
                 }
-                // What is read again is still there as it was.
-                if self.session.is_none() && !wanted.reads_again {
+                // Unless its tree is there already.
+                if self.session.is_none() && self.packed.nodes.is_empty() {
                     job::check_scene_memory(&input.scene).with_context(|| opened.source.name.clone())?;
                 }
                 shared.update(|board| board.phase = Phase::Preparing);
@@ -193,12 +207,18 @@ impl Have {
                 let said = self.session.as_ref().map_or(&[][..], |session| &session.input.warnings);
                 let is_new = |warning: &&String| !said.contains(warning);
                 let warnings: Vec<_> = input.warnings.iter().filter(is_new).cloned().map(Message::Warning).collect();
-                let before = self.session.take().filter(|_| device.can_follow(&settings));
+                let can_follow = device.can_follow(&settings);
+                // Of another device the memory first.
+                let (session, before) = match self.session.take() {
+                    Some(session) if can_follow => (Some(session), Arc::default()),
+                    Some(session) => (None, session.into_scene()),
+                    None => (None, Arc::new(std::mem::take(&mut self.packed))),
+                };
                 device.follow(&settings)?;
                 let settings = Arc::new(settings);
-                let session = match before {
+                let session = match session {
                     Some(mut session) => session.change(device, settings, input).map(|()| session)?,
-                    None => Session::new(device, opened, settings, input, shared.interrupt())?,
+                    None => Session::new(device, opened, settings, input, &before, shared.interrupt())?,
                 };
                 shared.update(|board| {
                     board.messages.extend(warnings);
