@@ -110,7 +110,9 @@ struct SceneInfo {
     environment_height: u32,
     environment_rotation: vec2<f32>,
     epsilon: f32,
-    environment_strength: f32,
+    pad0: u32,
+    environment_scale: vec3<f32>,
+    pad1: u32,
 }
 
 struct Camera {

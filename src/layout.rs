@@ -219,8 +219,12 @@ pub struct SceneInfo {
     pub environment_rotation: [f32; 2],
     /// Smallest distance a ray starts away from a surface, relative to the largest coordinate of the point.
     pub epsilon: f32,
+    /// Zero.
+    pub pad0: u32,
     /// Factor on the environment's texels.
-    pub environment_strength: f32,
+    pub environment_scale: [f32; 3],
+    /// Zero.
+    pub pad1: u32,
 }
 
 /// The camera; rows of world-from-camera.

@@ -262,7 +262,7 @@ fn light_environment(direction: vec3<f32>) -> vec3<f32> {
     let j = i32(floor(y));
     let low = environment_fetch(i, j) * (1.0 - fx) + environment_fetch(i + 1, j) * fx;
     let high = environment_fetch(i, j + 1) * (1.0 - fx) + environment_fetch(i + 1, j + 1) * fx;
-    return (low * (1.0 - fy) + high * fy) * scene_info.environment_strength;
+    return (low * (1.0 - fy) + high * fy) * scene_info.environment_scale;
 }
 
 fn environment_fetch(x: i32, y: i32) -> vec3<f32> {

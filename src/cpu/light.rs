@@ -228,7 +228,7 @@ pub fn environment(scene: &PackedScene, direction: Vec3) -> Vec3 {
     let (i, j) = (x0 as i32, y0 as i32);
     let low = fetch(i, j) * (1.0 - fx) + fetch(i + 1, j) * fx;
     let high = fetch(i, j + 1) * (1.0 - fx) + fetch(i + 1, j + 1) * fx;
-    (low * (1.0 - fy) + high * fy) * scene.info.environment_strength
+    (low * (1.0 - fy) + high * fy) * Vec3::from(scene.info.environment_scale)
 }
 
 /// Sends out a photon: `u` chooses the light and where, `v` the direction and the side.

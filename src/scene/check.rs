@@ -211,7 +211,8 @@ fn check_environment(environment: &Environment) -> Problem {
     require(bad.is_none(), "texels", || format!("texel {} is not finite and ≥ 0", bad.unwrap_or(0)))?;
     require(environment.rotation.is_finite(), "rotation", || format!("{} is not finite", environment.rotation))?;
     let strength = environment.strength;
-    require(strength.is_finite() && strength >= 0.0, "strength", || format!("{strength} is not finite and ≥ 0"))
+    require(strength.is_finite() && strength >= 0.0, "strength", || format!("{strength} is not finite and ≥ 0"))?;
+    require(not_negative(environment.tint), "tint", || format!("{} is not finite and ≥ 0", environment.tint))
 }
 
 fn not_negative(v: Vec3) -> bool {

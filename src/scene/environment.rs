@@ -2,7 +2,7 @@
 
 use std::f32::consts::{PI, TAU};
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::Environment;
 
@@ -21,14 +21,14 @@ impl Environment {
 
     /// The same radiance from everywhere. Several rows, for directions are sampled by row.
     pub fn uniform(radiance: Vec3) -> Self {
-        Self { width: 2, height: 32, texels: vec![radiance; 64].into(), rotation: 0.0, strength: 1.0 }
+        Self { width: 2, height: 32, texels: vec![radiance; 64].into(), rotation: 0.0, strength: 1.0, tint: Vec3::ONE }
     }
 }
 
-/// At strength 1: radiance with the cumulative probability within its row, cumulative probability of the rows, and mean
-/// luminance over the sphere. Radiance is interpolated bilinearly, so a texel's weight is the mean over its neighbours: nothing bright
+/// Without strength and tint: radiance with the cumulative probability within its row, cumulative probability of the rows, and
+/// mean radiance over the sphere. Radiance is interpolated bilinearly, so a texel's weight is the mean over its neighbours: nothing bright
 /// has density zero.
-pub(super) fn pack(e: &Environment) -> (Vec<[f32; 4]>, Vec<f32>, f32) {
+pub(super) fn pack(e: &Environment) -> (Vec<[f32; 4]>, Vec<f32>, Vec3) {
     let (w, h) = (e.width as usize, e.height as usize);
     let luminance = |x: usize, y: usize| f64::from(e.texels[y * w + x].dot(Vec3::new(0.2126, 0.7152, 0.0722)).max(0.0));
     let solid_angle = |y: usize| {
@@ -37,7 +37,7 @@ pub(super) fn pack(e: &Environment) -> (Vec<[f32; 4]>, Vec<f32>, f32) {
     };
     let mut texels = Vec::with_capacity(w * h);
     let mut rows = Vec::with_capacity(h);
-    let (mut total, mut mean) = (0.0, 0.0);
+    let (mut total, mut mean) = (0.0, DVec3::ZERO);
     for y in 0..h {
         let weight = |x: usize| {
             let mut sum = 0.0;
@@ -52,7 +52,7 @@ pub(super) fn pack(e: &Environment) -> (Vec<[f32; 4]>, Vec<f32>, f32) {
         let mut sum = 0.0;
         for x in 0..w {
             sum += weight(x);
-            mean += luminance(x, y) * solid_angle(y);
+            mean += e.texels[y * w + x].as_dvec3() * solid_angle(y);
             let cumulative = if x == w - 1 {
                 1.0
             } else if row > 0.0 {
@@ -70,5 +70,5 @@ pub(super) fn pack(e: &Environment) -> (Vec<[f32; 4]>, Vec<f32>, f32) {
     if let Some(last) = rows.last_mut() {
         *last = 1.0;
     }
-    (texels, rows, mean as f32)
+    (texels, rows, mean.as_vec3())
 }

@@ -89,7 +89,7 @@ pub fn glb_bytes(scene: &Scene) -> Result<Vec<u8>, ExportError> {
     writer.finish()
 }
 
-/// Writes an environment beside a scene as Radiance RGBE: texels without `strength` and `rotation`, row 0 on top.
+/// Writes an environment beside a scene as Radiance RGBE: texels without `strength`, `tint` and `rotation`, row 0 on top.
 pub fn write_environment_hdr(environment: &Environment, path: &Path) -> Result<(), ExportError> {
     let texels: Vec<_> = environment.texels.iter().map(|t| image::Rgb(t.to_array())).collect();
     let mut bytes = Vec::new();

@@ -288,6 +288,8 @@ pub struct Environment {
     pub rotation: f32,
     /// Factor on every texel.
     pub strength: f32,
+    /// Another, linear RGB.
+    pub tint: Vec3,
 }
 
 /// A camera that looks along its −z with +y up (glTF's).

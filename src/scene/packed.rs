@@ -34,7 +34,7 @@ pub struct PackedScene {
     pub texels: Arc<Vec<u32>>,
     /// Ordered; the last `cumulative` is 1.
     pub lights: Vec<layout::Light>,
-    /// Radiance at strength 1 and, fourth, the cumulative probability within the row, `[height · width]`.
+    /// Radiance without strength and tint and, fourth, the cumulative probability within the row, `[height · width]`.
     pub environment: Arc<Vec<[f32; 4]>>,
     /// Cumulative probability of the rows.
     pub environment_rows: Arc<Vec<f32>>,
@@ -215,10 +215,10 @@ mod tests {
             assert_same(&after, &PackedScene::new(scene));
             after
         };
-        // Neither strength nor rotation of the sky is in its texels.
+        // Neither strength nor tint nor rotation of the sky is in its texels.
         scene.materials.last_mut().expect("it has some").roughness = 0.5;
         let sky = scene.environment.as_mut().expect("it has one");
-        (sky.strength, sky.rotation) = (0.0, 1.0);
+        (sky.strength, sky.tint, sky.rotation) = (0.0, Vec3::X, 1.0);
         let look = after(&scene);
         assert_eq!(shared(&look, &before), [true; 5]);
         assert!(look.materials != before.materials && look.lights.len() < before.lights.len());

@@ -131,6 +131,7 @@ pub fn everything() -> Scene {
             texels: (0..512).map(|i| Vec3::from_slice(&random(i, 1)).powf(4.0)).collect::<Vec<_>>().into(),
             rotation: 0.7,
             strength: 0.02,
+            tint: Vec3::new(1.0, 0.5, 2.0),
         }),
         cameras: vec![Camera {
             aperture_radius: 0.02,
@@ -421,10 +422,11 @@ fn scene_can_be_replaced(mut film: impl FnMut(&Arc<PackedScene>, layout::Camera,
     let camera = scene.cameras[0].pack(24, 16);
     let mut packed = Arc::new(PackedScene::new(&scene));
     let mut before = film(&packed, camera, &params, false);
-    let changes: [fn(&mut Scene); 10] = [
+    let changes: [fn(&mut Scene); 11] = [
         |scene| scene.materials[0].base_color = Vec3::new(0.1, 0.2, 0.9),
         |scene| scene.materials[3].emission = Vec3::splat(2.0),
         |scene| scene.environment.as_mut().expect("it has one").strength = 0.5,
+        |scene| scene.environment.as_mut().expect("it has one").tint = Vec3::new(0.2, 1.0, 0.3),
         |scene| scene.environment = Some(Environment::uniform(Vec3::new(0.2, 0.4, 0.1))),
         |scene| scene.images[0] = noise_image("larger", 40, 30).into(),
         |scene| scene.spheres[2].radius = 0.7,
@@ -517,7 +519,14 @@ fn a_dark_environment_takes_no_room() {
         return;
     }
     let texels = Arc::new(vec![Vec3::ONE; width as usize * height as usize]);
-    let map = |strength| Environment { width: width as u32, height, texels: texels.clone(), rotation: 0.0, strength };
+    let map = |strength| Environment {
+        width: width as u32,
+        height,
+        texels: texels.clone(),
+        rotation: 0.0,
+        strength,
+        tint: Vec3::ONE,
+    };
     let packed = |strength| PackedScene::new(&Scene { environment: Some(map(strength)), ..everything() });
     let stages = |strength| GpuStages::new(context.clone(), &packed(strength), layout::Camera::default());
     assert!(stages(0.0).is_ok());

@@ -103,6 +103,7 @@ fn read_scene(description: &Value) -> (Scene, Camera) {
             texels: list(&e["rgb"]).map(vector).collect::<Vec<_>>().into(),
             rotation: number(&e["rotation"]),
             strength: 1.0,
+            tint: Vec3::ONE,
         });
     }
     let c = &description["camera"];

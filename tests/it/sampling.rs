@@ -462,7 +462,7 @@ fn sky() -> Environment {
         .collect();
     texels[(3 * width + 20) as usize] = Vec3::splat(200.0);
     texels[(12 * width) as usize] = Vec3::new(10.0, 0.0, 0.0);
-    Environment { width, height, texels: texels.into(), rotation: 0.7, strength: 0.5 }
+    Environment { width, height, texels: texels.into(), rotation: 0.7, strength: 0.5, tint: Vec3::new(1.0, 0.5, 2.0) }
 }
 
 /// Triangles, a ball and a turned sky, chosen by power: the sum of their densities at each direction.

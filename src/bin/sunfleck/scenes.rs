@@ -277,7 +277,8 @@ pub fn export(args: &ExportArgs) -> Result<ExitCode> {
     atomic::write(path, |writer| writer.write_all(&bytes))?;
     eprintln!("wrote {}", path.display());
     if let Some(mut environment) = scene.environment {
-        Arc::make_mut(&mut environment.texels).iter_mut().for_each(|texel| *texel *= environment.strength);
+        let scale = environment.strength * environment.tint;
+        Arc::make_mut(&mut environment.texels).iter_mut().for_each(|texel| *texel *= scale);
         export::write_environment_hdr(&environment, &beside)?;
         let turned = match environment.rotation {
             0.0 => String::new(),

@@ -8,7 +8,7 @@ pub use camera::default_camera;
 
 use super::{Environment, Material, Scene};
 use glam::Vec3;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Texels of the default sky's height; its width is twice that.
 const SKY_HEIGHT: u32 = 128;
@@ -58,8 +58,10 @@ pub fn default_sky() -> Environment {
         let base = ground.lerp(sky, smoothstep((direction.y + 0.1) / 0.2));
         base + SUN * ((direction.dot(sun_direction) - 1.0) / SUN_WIDTH).exp()
     };
-    let texels = (0..width * height).map(texel).collect();
-    Environment { width, height, texels: Arc::new(texels), rotation: 0.0, strength: 1.0 }
+    // The very same each time, for those who compare.
+    static TEXELS: OnceLock<Arc<Vec<Vec3>>> = OnceLock::new();
+    let texels = TEXELS.get_or_init(|| Arc::new((0..width * height).map(texel).collect()));
+    Environment { width, height, texels: Arc::clone(texels), rotation: 0.0, strength: 1.0, tint: Vec3::ONE }
 }
 
 fn smoothstep(t: f32) -> f32 {

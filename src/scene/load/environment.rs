@@ -57,7 +57,10 @@ pub fn load_environment(path: &Path) -> Result<(Environment, Vec<String>), LoadE
         ));
     }
     let [width, height] = map.size.map(|n| n as u32);
-    Ok((Environment { width, height, texels: map.texels.into(), rotation: 0.0, strength: 1.0 }, warnings))
+    Ok((
+        Environment { width, height, texels: map.texels.into(), rotation: 0.0, strength: 1.0, tint: Vec3::ONE },
+        warnings,
+    ))
 }
 
 fn read_hdr(bytes: &[u8]) -> Result<Downsampled, String> {

@@ -15,8 +15,8 @@ pub(super) struct Sky {
     /// Only to tell whether others are these.
     texels: Weak<Vec<Vec3>>,
     size: [u32; 2],
-    /// Mean luminance at strength 1.
-    mean: f32,
+    /// Mean radiance without strength and tint.
+    mean: Vec3,
 }
 
 /// A primitive that shines.
@@ -28,7 +28,7 @@ struct Lamp {
 }
 
 impl PackedScene {
-    /// The environment at strength 1, shared with `before` if it is the same; also one that does not shine.
+    /// The environment without strength and tint, shared with `before` if it is the same; also one that does not shine.
     pub(super) fn pack_environment(&mut self, scene: &Scene, before: &Self) {
         let Some(e) = &scene.environment else { return };
         let (texels, size) = (Arc::downgrade(&e.texels), [e.width, e.height]);
@@ -89,11 +89,12 @@ impl PackedScene {
         }
         self.info.environment_light = NONE;
         if let Some((e, sky)) = scene.environment.as_ref().zip(self.sky.as_ref()) {
-            let mean = sky.mean * e.strength;
+            let scale = e.tint * e.strength;
+            let mean = luminance(sky.mean * scale);
             if mean > 0.0 {
                 [self.info.environment_width, self.info.environment_height] = sky.size;
                 self.info.environment_rotation = [e.rotation.cos(), e.rotation.sin()];
-                self.info.environment_strength = e.strength;
+                self.info.environment_scale = scale.to_array();
                 self.info.environment_light = self.lights.len() as u32;
                 self.lights.push(layout::Light {
                     kind: layout::LIGHT_ENVIRONMENT,

@@ -11,7 +11,6 @@ use crate::scene::{
 };
 use glam::{Affine3A, Vec3};
 use std::path::Path;
-use std::sync::Arc;
 
 /// Collects the first wrong value.
 pub(super) struct Checks(Result<(), Wrong>);
@@ -317,9 +316,7 @@ impl EnvironmentSettings {
                 problem: "neither file nor color is given, and the scene has no environment of its own".into(),
             })?,
         };
-        if let Some(color) = self.color.map(Vec3::from) {
-            Arc::make_mut(&mut environment.texels).iter_mut().for_each(|texel| *texel *= color);
-        }
+        environment.tint *= self.color.map_or(Vec3::ONE, Vec3::from);
         environment.rotation = self.rotation_degrees.map_or(environment.rotation, f32::to_radians);
         environment.strength = self.strength.unwrap_or(environment.strength);
         scene.environment = Some(environment);

@@ -331,5 +331,5 @@ fn sky() -> Environment {
             std::iter::repeat_n(color, width as usize)
         })
         .collect();
-    Environment { width, height, texels: Arc::new(texels), rotation: 0.0, strength: 1.0 }
+    Environment { width, height, texels: Arc::new(texels), rotation: 0.0, strength: 1.0, tint: Vec3::ONE }
 }

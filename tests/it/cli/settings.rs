@@ -44,7 +44,14 @@ fn an_environment_that_is_named_is_changed_by_set() {
     let folder = folder_with_floor();
     fs::create_dir(folder.path().join("sub")).unwrap();
     let texels = [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(Vec3::from);
-    let sky = Environment { width: 4, height: 1, texels: texels.to_vec().into(), rotation: 0.0, strength: 1.0 };
+    let sky = Environment {
+        width: 4,
+        height: 1,
+        texels: texels.to_vec().into(),
+        rotation: 0.0,
+        strength: 1.0,
+        tint: Vec3::ONE,
+    };
     write_environment_hdr(&sky, &folder.path().join("sky.hdr")).unwrap();
     let file = |name: &str, fields: &str| {
         let text = format!("scene = \"../floor.gltf\"\n[environment]\n{fields}\n");

@@ -78,7 +78,8 @@ fn everything_at_once() {
     assert_eq!((light.direction, light.intensity), (Vec3::NEG_Y, Vec3::new(200.0, 100.0, 0.0)));
     assert_eq!(light.kind, PunctualKind::Spot { inner: 0.0, outer: 30_f32.to_radians() });
     let environment = scene.environment.unwrap();
-    assert_eq!((environment.texels[0], environment.strength), (Vec3::new(0.5, 0.5, 1.0), 6.0));
+    assert_eq!((environment.tint, environment.strength), (Vec3::new(0.5, 0.5, 1.0), 6.0));
+    assert_eq!(environment.texels[0], Vec3::ONE);
 }
 
 #[test]

@@ -165,8 +165,9 @@ fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
             });
         }
     }
-    // With a reference, of either.
-    let not_finite = painted.figures.map_or(painted.histogram.luminance.not_finite, |f| f.not_finite as u64);
+    // Beside a reference, of either.
+    let figures = painted.figures.filter(|_| painted.painting.comparison != Comparison::Off);
+    let not_finite = figures.map_or(painted.histogram.luminance.not_finite, |f| f.not_finite as u64);
     if not_finite > 0 {
         ui.horizontal(|ui| {
             ui.label(RichText::new("■").color(rgba(NOT_FINITE)));
