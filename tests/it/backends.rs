@@ -420,8 +420,9 @@ fn scene_can_be_replaced(mut film: impl FnMut(&Arc<PackedScene>, layout::Camera,
     let params = Params { n_paths: 4_000, ..Params::new(24, 16) };
     let mut scene = everything();
     let camera = scene.cameras[0].pack(24, 16);
-    let mut packed = Arc::new(PackedScene::new(&scene));
-    let mut before = film(&packed, camera, &params, false);
+    // The ones before are still there, as in a window that shows their pictures.
+    let mut all = vec![Arc::new(PackedScene::new(&scene))];
+    let mut before = film(&all[0], camera, &params, false);
     let changes: [fn(&mut Scene); 11] = [
         |scene| scene.materials[0].base_color = Vec3::new(0.1, 0.2, 0.9),
         |scene| scene.materials[3].emission = Vec3::splat(2.0),
@@ -437,8 +438,9 @@ fn scene_can_be_replaced(mut film: impl FnMut(&Arc<PackedScene>, layout::Camera,
     ];
     for (i, change) in changes.into_iter().enumerate() {
         change(&mut scene);
-        packed = Arc::new(PackedScene::new_after(&packed, &scene));
+        let packed = Arc::new(PackedScene::new_after(&all[i], &scene));
         let set = film(&packed, camera, &params, true);
+        all.push(packed);
         assert!(set == film(&Arc::new(PackedScene::new(&scene)), camera, &params, false), "change {i}");
         assert!(set != before, "change {i} is not seen");
         before = set;
