@@ -1,11 +1,13 @@
 //! The bar above and the line below.
 
+use std::sync::Arc;
+
 use eframe::egui;
 use egui::{Button, DragValue};
 use sunfleck::scene::settings::parse_count;
 
 use super::app::Viewer;
-use super::engine::{Limits, Phase};
+use super::engine::{Frame, Limits, Phase};
 use super::files;
 use crate::progress;
 
@@ -181,7 +183,8 @@ fn limit(ui: &mut egui::Ui, mut is_on: bool, name: &str, help: &str, number: Dra
 
 /// How far it is on the way to the limit that comes first.
 fn progress_bar(ui: &mut egui::Ui, viewer: &Viewer) {
-    let Some(frame) = viewer.now.frame.as_ref().filter(|frame| !frame.is_preview) else { return };
+    let is_of_now = |frame: &&Arc<Frame>| !frame.is_preview && frame.estimate == viewer.now.estimate;
+    let Some(frame) = viewer.now.frame.as_ref().filter(is_of_now) else { return };
     let noise = viewer.engine().history(|history| history.estimated.last().map(|measured| measured.rel_mse));
     let alpha = f64::from(frame.params.alpha);
     let Some(left) = seconds_left(&viewer.wanted.limits, frame.film.n_iterations, frame.seconds, noise, alpha) else {
@@ -241,6 +244,9 @@ pub fn status(ui: &mut egui::Ui, viewer: &Viewer) {
             if frame.is_preview {
                 ui.separator();
                 ui.label("preview");
+            } else if frame.estimate != now.estimate {
+                ui.separator();
+                ui.label("picture of before");
             }
         }
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {

@@ -498,3 +498,21 @@ fn a_panic_is_an_error() {
     let text = catch(|| -> u32 { panic!("at {}\nof", 7) }).unwrap_err();
     assert_eq!(text, "a bug in sunfleck: at 7 of");
 }
+
+/// Meshes and arrays, whatever was changed meanwhile.
+#[test]
+fn what_scenes_share_is_freed_with_the_last() {
+    let mut bench = Bench::open("cornell", until(2));
+    let now = bench.wait_for_film(&Phase::Reached, 2);
+    let scene = &now.opened.as_ref().unwrap().loaded.scene;
+    let (mesh, before) = (Arc::downgrade(&scene.meshes[0]), now.estimate);
+    let first = Arc::downgrade(&now.frame.as_ref().unwrap().scene.nodes);
+    bench.set(|settings| settings.material_mut(scene, 0).emission = Some([1.0; 3]));
+    drop(now);
+    let now = bench.wait("the change", |now| now.phase == Phase::Reached && now.estimate > before);
+    let second = Arc::downgrade(&now.frame.as_ref().unwrap().scene.primitives);
+    drop(now);
+    bench.wanted.scene = None;
+    bench.send();
+    bench.wait("memory", |_| mesh.strong_count() + first.strong_count() + second.strong_count() == 0);
+}

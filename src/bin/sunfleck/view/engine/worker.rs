@@ -16,6 +16,7 @@ use crate::devices::Device;
 use crate::job;
 
 /// What the render thread has of what is wanted.
+#[derive(Default)]
 struct Have {
     wanted: Wanted,
     reader: Reader,
@@ -44,15 +45,7 @@ impl Work {
 
 /// Until the interface is gone.
 pub fn run(shared: &Arc<Shared>, mut device: Device) {
-    let mut have = Have {
-        wanted: Wanted::default(),
-        reader: Reader::default(),
-        session: None,
-        opened: None,
-        packed: PackedScene::default(),
-        estimate: 0,
-        steps_done: 0,
-    };
+    let mut have = Have::default();
     loop {
         let wanted = {
             let board = shared.wait_until(|board| {
@@ -121,7 +114,7 @@ impl Have {
         if reads {
             // The memory of the device first; of a scene that is read again the picture stays, for the file may be broken.
             let opened_before = self.opened.take();
-            self.session = None;
+            (self.session, self.packed) = (None, PackedScene::default());
             let stays = wanted.reads_again && before.scene == wanted.scene;
             // Freed here, and not while others wait for the board.
             drop(shared.update(|board| {
@@ -240,7 +233,8 @@ impl Have {
             board.history = Default::default();
         });
         session.restart(self.estimate, wanted.moving)?;
-        Ok(())
+        // At once: what it took to come here may have outlasted the motion.
+        if wanted.moving { self.iterate(shared, wanted) } else { Ok(()) }
     }
 
     fn iterate(&mut self, shared: &Shared, wanted: &Wanted) -> Result<()> {
@@ -382,5 +376,33 @@ fn of_scene(settings: &Settings) -> Settings {
         accel: settings.accel.filter(|&accel| accel != Accelerator::default()),
         light_scale: settings.light_scale.filter(|&scale| scale != 1.0),
         ..settings.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Choice;
+    use super::*;
+
+    #[test]
+    fn a_motion_that_is_over_before_its_scene_is_ready_has_its_preview() {
+        let set = ["size=32x24", "photons=500"].map(str::to_owned).to_vec();
+        let resting = Wanted {
+            scene: Some(Arc::new(Choice { name: "cornell".to_owned(), set })),
+            limits_at_first: Some(Default::default()),
+            ..Wanted::default()
+        };
+        let moving = Wanted { moving: true, ..resting.clone() };
+        let shared = Shared::new(Arc::new(|| {}));
+        let (mut have, mut device) = (Have::default(), Device::Cpu(Accelerator::Bvh));
+        shared.board().wanted = resting.clone();
+        have.follow(&shared, &mut device, &moving).unwrap();
+        let is_preview = || shared.board().frame.as_ref().map(|frame| frame.is_preview);
+        assert_eq!(is_preview(), Some(true));
+        assert!(have.is_behind(&resting));
+        for _ in 0..2 {
+            have.follow(&shared, &mut device, &resting).unwrap();
+        }
+        assert_eq!(is_preview(), Some(false));
     }
 }
