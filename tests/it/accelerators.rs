@@ -200,7 +200,7 @@ fn a_scene_of_nothing_or_of_spheres_only_has_a_tree() {
 fn what_is_too_far_for_planes_is_refused() {
     let far = quad(0, Vec3::splat(1e20), Vec3::X * 1e19, Vec3::Y * 1e19);
     let packed =
-        PackedScene::new(&Scene { meshes: vec![far.into()], materials: vec![Material::default()], ..Scene::default() });
+        PackedScene::new(&Scene { meshes: vec![far], materials: vec![Material::default()], ..Scene::default() });
     assert_eq!(packed.accelerated(Accelerator::Kd).err(), Some(kd::Error::Vertex(0)));
 }
 

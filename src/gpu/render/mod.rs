@@ -225,7 +225,7 @@ impl GpuStages {
             next = Rows::new(frame, rows.end(), self.reach_pace.amount());
         }
         batch.submit()?;
-        Ok(self.readback.read(&self.context, &self.shared, reaches.raw(), self.n_pixels as usize)?)
+        self.readback.read(&self.context, &self.shared, reaches.raw(), self.n_pixels as usize)
     }
 
     /// Asks the BSDF of the shaders: for tests.
