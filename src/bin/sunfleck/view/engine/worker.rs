@@ -191,8 +191,8 @@ impl Have {
                 if held.is_none_or(|held| job::needs_more(&input.params, held)) {
                     job::check_memory(&input.params, held.filter(|_| on_host))?;
                 }
-                // Unless its tree is there already.
-                if self.session.is_none() && self.packed.nodes.is_empty() {
+                // Unless its tree is there already; what is read again is still there as it was.
+                if self.session.is_none() && self.packed.nodes.is_empty() && !wanted.reads_again {
                     job::check_scene_memory(&input.scene).with_context(|| opened.source.name.clone())?;
                 }
                 shared.update(|board| board.phase = Phase::Preparing);
