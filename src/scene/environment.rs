@@ -25,9 +25,9 @@ impl Environment {
     }
 }
 
-/// Without strength and tint: radiance with the cumulative probability within its row, cumulative probability of the rows, and
-/// mean radiance over the sphere. Radiance is interpolated bilinearly, so a texel's weight is the mean over its neighbours: nothing bright
-/// has density zero.
+/// Without strength and tint: radiance with the cumulative probability within its row, cumulative probability of the rows,
+/// and mean radiance over the sphere. Radiance is interpolated bilinearly, so a texel's weight is the mean over its
+/// neighbours: nothing bright has density zero.
 pub(super) fn pack(e: &Environment) -> (Vec<[f32; 4]>, Vec<f32>, Vec3) {
     let (w, h) = (e.width as usize, e.height as usize);
     let luminance = |x: usize, y: usize| f64::from(e.texels[y * w + x].dot(Vec3::new(0.2126, 0.7152, 0.0722)).max(0.0));

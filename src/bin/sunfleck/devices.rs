@@ -209,6 +209,7 @@ impl Device {
     }
 
     /// Whether it need not be opened anew to search as `settings` say.
+    #[cfg(feature = "view")]
     pub fn can_follow(&self, settings: &Settings) -> bool {
         match self {
             Self::Cpu(_) => true,
@@ -219,17 +220,16 @@ impl Device {
 
     /// Searches as `settings` say from now on, by the default where it cannot; opened anew, if it must be.
     pub fn follow(&mut self, settings: &Settings) -> Result<()> {
-        let can_follow = self.can_follow(settings);
         match self {
             Self::Cpu(accelerator) => *accelerator = settings.accel.unwrap_or_default(),
             #[cfg(feature = "gpu")]
-            Self::Gpu { context, method, .. } if !can_follow => {
+            Self::Gpu { context, method, .. } => {
                 let wanted = method_for(context, settings);
-                *context = reopened(context, wanted).context("index")?;
-                *method = wanted;
+                if *method != wanted {
+                    *context = reopened(context, wanted).context("index")?;
+                    *method = wanted;
+                }
             }
-            #[cfg(feature = "gpu")]
-            Self::Gpu { .. } => {}
         }
         Ok(())
     }

@@ -166,9 +166,9 @@ impl GpuStages {
         self.begin_paces();
     }
 
-    /// Whether the device itself finds what first radii are chosen from, or the processor does, from all that is read back (if
-    /// never called, only for software, which reads back at no cost and takes two and a half times as long itself). Where ray
-    /// queries search, the processor does in any case. It changes the radii by rounding at most, but for those of previews: the
+    /// Whether the device itself finds what first radii are chosen from; else the processor does, from all that is read back.
+    /// If never called it is the device, but for software, which reads back at no cost and takes two and a half times as long.
+    /// Where ray queries search, it is the processor in any case. Radii differ by rounding, and those of previews by more: the
     /// processor searches around some of their pixels only.
     pub fn set_reaches_on_device(&mut self, on_device: bool) {
         self.reaches_on_device = on_device;
@@ -207,8 +207,7 @@ impl GpuStages {
         reaches.reserve(&self.context, u64::from(self.n_pixels))?;
         let mut batch = Batch::new(&self.context, &self.shared, "distances to photons");
         self.scene.set_frame(&batch, frame);
-        let mut next = Rows::new(frame, 0, self.reach_pace.amount());
-        while let Some(rows) = next {
+        Rows::each(frame, &mut batch, &mut self.reach_pace, |batch, rows| {
             let buffers = [
                 rows.of(&self.eye_vertices),
                 self.photons.all(),
@@ -219,11 +218,7 @@ impl GpuStages {
             let n_levels = self.index.levels.len() as u32;
             let arguments = self.index.arguments([rows.n, self.n_photons, n_levels, rows.skipped()]);
             batch.dispatch(&kernel, &buffers, arguments, rows.workgroups());
-            if rows.end() < frame.height {
-                self.reach_pace.learn(batch.cut(rows.pixels())?);
-            }
-            next = Rows::new(frame, rows.end(), self.reach_pace.amount());
-        }
+        })?;
         batch.submit()?;
         self.readback.read(&self.context, &self.shared, reaches.raw(), self.n_pixels as usize)
     }
@@ -268,6 +263,24 @@ impl Rows {
     fn new(frame: &Frame, first: u32, amount: u32) -> Option<Self> {
         let n = (amount / frame.width.max(1)).next_multiple_of(TILE).max(TILE);
         (first < frame.height).then(|| Self { first, n: n.min(frame.height - first), width: frame.width })
+    }
+
+    /// Has `record` dispatch all of the film, some rows at a time, as many as `pace` says and learns from.
+    fn each<'a>(
+        frame: &Frame,
+        batch: &mut Batch<'a>,
+        pace: &mut Pace,
+        mut record: impl FnMut(&mut Batch<'a>, &Self),
+    ) -> Result<(), Error> {
+        let mut next = Self::new(frame, 0, pace.amount());
+        while let Some(rows) = next {
+            record(batch, &rows);
+            if rows.end() < frame.height {
+                pace.learn(batch.cut(rows.pixels())?);
+            }
+            next = Self::new(frame, rows.end(), pace.amount());
+        }
+        Ok(())
     }
 
     /// The next ones.
@@ -332,8 +345,7 @@ impl Stages for GpuStages {
         context.guarded(|| {
             self.shared.set_groups(self.scene.set(&context, scene)?);
             Ok(())
-        })?;
-        Ok(())
+        })
     }
 
     fn set_interrupt(&mut self, interrupt: Interrupt) {
@@ -356,16 +368,11 @@ impl Stages for GpuStages {
         let mut batch = Batch::new(&self.context, &self.shared, "eye");
         self.scene.set_frame(&batch, frame);
         self.timer.begin(EYE, &mut batch);
-        let mut next = Rows::new(frame, 0, self.eye_pace.amount());
-        while let Some(rows) = next {
+        Rows::each(frame, &mut batch, &mut self.eye_pace, |batch, rows| {
             let buffers = [rows.of(&self.eye_vertices)];
             let arguments = [rows.n, rows.first, rows.skipped(), 0];
             batch.dispatch(&self.trace_eye, &buffers, arguments, rows.workgroups());
-            if rows.end() < frame.height {
-                self.eye_pace.learn(batch.cut(rows.pixels())?);
-            }
-            next = Rows::new(frame, rows.end(), self.eye_pace.amount());
-        }
+        })?;
         self.timer.end(EYE, batch, &self.context)
     }
 
@@ -433,8 +440,7 @@ impl Stages for GpuStages {
         let mut batch = Batch::new(&self.context, &self.shared, "gather");
         self.scene.set_frame(&batch, frame);
         self.timer.begin(GATHER, &mut batch);
-        let mut next = Rows::new(frame, 0, self.gather_pace.amount());
-        while let Some(rows) = next {
+        Rows::each(frame, &mut batch, &mut self.gather_pace, |batch, rows| {
             let buffers = [
                 rows.of(&self.eye_vertices),
                 rows.of(&self.first_radii),
@@ -445,11 +451,7 @@ impl Stages for GpuStages {
             let n_levels = self.index.levels.len() as u32;
             let arguments = self.index.arguments([rows.n, self.n_photons, n_levels, rows.skipped()]);
             batch.dispatch(&self.gather, &buffers, arguments, rows.workgroups());
-            if rows.end() < frame.height {
-                self.gather_pace.learn(batch.cut(rows.pixels())?);
-            }
-            next = Rows::new(frame, rows.end(), self.gather_pace.amount());
-        }
+        })?;
         self.timer.end(GATHER, batch, &self.context)
     }
 

@@ -258,11 +258,7 @@ impl Viewer {
 
     /// Changes the settings; `what` names what is edited, for undo.
     pub fn edit(&mut self, ui: &egui::Ui, what: &'static str, change: impl FnOnce(&mut Settings)) {
-        let (time, is_dragging) = ui.input(|i| (i.time, i.pointer.is_decidedly_dragging()));
-        match is_dragging {
-            true => self.preview_of(time, |viewer| viewer.edit_at(time, what, change)),
-            false => self.edit_at(time, what, change),
-        }
+        self.edit_at(ui.input(|i| i.time), what, change);
     }
 
     /// Changes something at `time`, seconds: previews until it rests, if it changes what is rendered.
@@ -492,9 +488,11 @@ impl Viewer {
         self.messages.show(ui);
         self.wanted.painting.look = self.look();
         let asks_anew = self.editing.as_ref().is_some_and(|opened| is_asked_anew(opened, &wanted, &self.wanted));
-        if asks_anew && wanted.restarts == self.wanted.restarts && self.iteration_seconds >= self.preview_from {
+        let (time, is_dragging) = ui.input(|i| (i.time, i.pointer.is_decidedly_dragging()));
+        let is_slow = self.iteration_seconds >= self.preview_from;
+        if asks_anew && wanted.restarts == self.wanted.restarts && (is_dragging || is_slow) {
             // Soon, and again to see that it rests.
-            self.picture.move_on(ui.input(|i| i.time));
+            self.picture.move_on(time);
             self.wanted.moving = true;
             ui.ctx().request_repaint_after_secs(0.03);
         }

@@ -225,6 +225,16 @@ mod tests {
         (remembered, memory, said)
     }
 
+    /// A window that finds nothing it can read, and closes a panel: what it has then, and what it was told.
+    fn closes_a_panel(path: &Path) -> (Remembered, Vec<Message>) {
+        let (mut remembered, mut memory, said) = open(path);
+        assert_eq!(remembered, Remembered::default());
+        remembered.show_inspect = false;
+        memory.keep(&remembered);
+        drop(memory);
+        (remembered, said.iter().collect())
+    }
+
     fn there(path: &Path) -> Remembered {
         read(path).unwrap().unwrap().1
     }
@@ -335,12 +345,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(FILE);
         fs::create_dir(&path).unwrap();
-        let (mut remembered, mut memory, said) = open(&path);
-        assert_eq!(remembered, Remembered::default());
-        remembered.show_inspect = false;
-        memory.keep(&remembered);
-        drop(memory);
-        let told: Vec<_> = said.iter().collect();
+        let (_, told) = closes_a_panel(&path);
         assert!(matches!(&told[..], [Message::Warning(why)] if why.contains("not a regular file")), "{told:?}");
         assert!(path.is_dir());
     }
@@ -351,12 +356,7 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join(FILE);
             fs::write(&path, broken).unwrap();
-            let (mut remembered, mut memory, said) = open(&path);
-            assert_eq!(remembered, Remembered::default());
-            remembered.show_inspect = false;
-            memory.keep(&remembered);
-            drop(memory);
-            let told: Vec<_> = said.iter().collect();
+            let (remembered, told) = closes_a_panel(&path);
             let [Message::Warning(why)] = &told[..] else { panic!("{told:?}") };
             assert!(why.contains("cannot be read") && why.ends_with("it is now remembered.toml-1.bad"), "{why}");
             assert!(!why.contains('\n'));
