@@ -486,6 +486,7 @@ impl Viewer {
         }
         super::help::show(ui, self);
         self.messages.show(ui);
+        super::keys::mark_focus(ui.ctx());
         self.wanted.painting.look = self.look();
         let asks_anew = self.editing.as_ref().is_some_and(|opened| is_asked_anew(opened, &wanted, &self.wanted));
         let (time, is_dragging) = ui.input(|i| (i.time, i.pointer.is_decidedly_dragging()));

@@ -9,6 +9,7 @@ use sunfleck::scene::settings::parse_count;
 use super::app::Viewer;
 use super::engine::{Frame, Limits, Phase};
 use super::files;
+use super::settings::widgets::{keep_keys, menu};
 use crate::progress;
 
 /// Room that the limits need, points; with less they are in a menu.
@@ -21,7 +22,7 @@ const PROGRESS_WIDTH: f32 = 150.0;
 pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
     egui::MenuBar::new().ui(ui, |ui| {
         let is_open = viewer.opened().is_some();
-        ui.menu_button("File", |ui| {
+        menu(ui, "File", |ui| {
             if ui.button("Open …").on_hover_text("A scene: .glb, .gltf, .obj, or settings: .toml (Ctrl+O)").clicked()
             {
                 files::open(viewer);
@@ -61,7 +62,7 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
                 ui.ctx().send_viewport_cmd(egui::ViewportCommand::Close);
             }
         });
-        ui.menu_button("Edit", |ui| {
+        menu(ui, "Edit", |ui| {
             if ui.add_enabled(viewer.edits.can_undo(), Button::new("Undo")).on_hover_text("Ctrl+Z").clicked() {
                 viewer.undo();
             }
@@ -69,7 +70,7 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
                 viewer.redo();
             }
         });
-        ui.menu_button("Window", |ui| {
+        menu(ui, "Window", |ui| {
             let width = ui.ctx().content_rect().width();
             let mut shows_inspect = viewer.shows_inspect(width);
             ui.checkbox(&mut viewer.remembered.show_settings, "Settings").on_hover_text("F1");
@@ -122,9 +123,10 @@ fn run(ui: &mut egui::Ui, viewer: &mut Viewer) {
         limits(ui, &mut viewer.wanted.limits);
     } else {
         let outside = egui::PopupCloseBehavior::CloseOnClickOutside;
-        egui::containers::menu::MenuButton::new("Stop at …")
+        let (response, inner) = egui::containers::menu::MenuButton::new("Stop at …")
             .config(egui::containers::menu::MenuConfig::new().close_behavior(outside))
             .ui(ui, |ui| limits(ui, &mut viewer.wanted.limits));
+        keep_keys(ui, &response, inner.is_some());
     }
     if ui.available_width() >= PROGRESS_WIDTH + 8.0 {
         progress_bar(ui, viewer);

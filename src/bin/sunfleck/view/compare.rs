@@ -15,11 +15,11 @@ use super::files;
 use super::inspect::{row, table};
 use super::keys::Keyboard;
 use super::settings::number::{Number, drag};
-use super::settings::widgets::{choice, within};
+use super::settings::widgets::{choice, list, within};
 
 /// What is said of the range of a difference.
 pub const RANGE: &str = "Where the colours of a difference end; what is above has the last of them, and what is not finite is \
-                         magenta. Automatic: at the 99th percentile, rounded up, without what differs by more than ten \
+                         magenta. Automatic, and 0: at the 99th percentile, rounded up, without what differs by more than ten \
                          times white or ten times the reference.";
 
 /// Half the width of what the line of the wipe is held by, points.
@@ -165,18 +165,14 @@ pub fn section(ui: &mut egui::Ui, viewer: &mut Viewer) {
     }
     let wanted = &mut viewer.wanted.painting.comparison;
     let (name, text) = describe(*wanted);
-    egui::ComboBox::from_id_salt("comparison")
-        .selected_text(name)
-        .width(160.0)
-        .height(400.0)
-        .show_ui(ui, |ui| {
-            for comparison in comparisons() {
-                let (name, text) = describe(comparison);
-                ui.selectable_value(wanted, comparison, name).on_hover_text(text);
-            }
-        })
-        .response
-        .on_hover_text(format!("{text}. Does not restart the estimate."));
+    let combo = egui::ComboBox::from_id_salt("comparison").selected_text(name).width(160.0).height(400.0);
+    let response = list(ui, combo, |ui| {
+        for comparison in comparisons() {
+            let (name, text) = describe(comparison);
+            ui.selectable_value(wanted, comparison, name).on_hover_text(text);
+        }
+    });
+    response.on_hover_text(format!("{text}. Does not restart the estimate."));
     if let Comparison::Difference(measure) = *wanted {
         range(ui, viewer, measure);
     }
@@ -234,9 +230,11 @@ fn range(ui: &mut egui::Ui, viewer: &mut Viewer, measure: Measure) {
         }
         if let Some(end) = end {
             let speed = 0.01 * f64::from(*end);
-            let field = drag(ui, end, Number::Plain, speed, 1e-30..=f32::MAX);
+            let field = drag(ui, end, Number::Plain, speed, 0.0..=f32::MAX);
             field.labelled_by(label.id).on_hover_text(RANGE);
         }
+        // Nothing ends there.
+        *end = end.filter(|&end| end > 0.0);
     });
 }
 

@@ -57,7 +57,7 @@ impl Kind {
                  (trimmed); and the slopes of the theory (Knaus & Zwicker 2011)"
             }
             Self::Radius => "median radius of the estimate",
-            Self::Rate => "photon paths that leave the lamps, and photons that are stored, a second",
+            Self::Rate => "photons emitted and photons stored, a second",
             Self::Stages => "milliseconds of each stage of an iteration; on a GPU from timestamps where it has them",
         }
     }

@@ -14,6 +14,7 @@ use sunfleck::ppm::film::luminance;
 use super::app::Viewer;
 use super::charts::{bar, bars, bounces, rgb, rgba, short};
 use super::engine::{Comparison, Legend, Message, NOTHING, Painted, Values, View};
+use super::settings::widgets::list;
 use crate::progress::{decimals, length};
 
 /// Of what there is nothing to say about.
@@ -76,15 +77,15 @@ fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
         let label = ui.label("Show");
         let difference = painted.and_then(Painted::difference).map(|of| super::compare::describe(of).0);
         let text = format!("{}. Does not restart the estimate. (V, Shift+V)", painting.view.describe());
-        let list = egui::ComboBox::from_id_salt("view").selected_text(difference.unwrap_or(painting.view.name()));
-        let list = |ui: &mut egui::Ui| {
-            list.height(400.0).show_ui(ui, |ui| {
+        let combo = egui::ComboBox::from_id_salt("view").selected_text(difference.unwrap_or(painting.view.name()));
+        let views = |ui: &mut egui::Ui| {
+            list(ui, combo.height(400.0), |ui| {
                 for view in View::ALL {
                     ui.selectable_value(&mut painting.view, view, view.name()).on_hover_text(view.describe());
                 }
             })
         };
-        let response = ui.add_enabled_ui(difference.is_none(), list).inner.response;
+        let response = ui.add_enabled_ui(difference.is_none(), views).inner;
         response.on_hover_text(text).on_disabled_hover_text(NO_VIEW).labelled_by(label.id);
         ui.end_row();
         let label = ui.label("Photons");
@@ -94,14 +95,13 @@ fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
             Some(ColorBy::Bounce) => "by bounce",
         };
         ui.horizontal(|ui| {
-            egui::ComboBox::from_id_salt("photons")
-                .selected_text(name(painting.photons))
-                .show_ui(ui, |ui| {
-                    for photons in [None, Some(ColorBy::Power), Some(ColorBy::Bounce)] {
-                        ui.selectable_value(&mut painting.photons, photons, name(photons));
-                    }
-                })
-                .response
+            let combo = egui::ComboBox::from_id_salt("photons").selected_text(name(painting.photons));
+            let colours = |ui: &mut egui::Ui| {
+                for photons in [None, Some(ColorBy::Power), Some(ColorBy::Bounce)] {
+                    ui.selectable_value(&mut painting.photons, photons, name(photons));
+                }
+            };
+            list(ui, combo, colours)
                 .on_hover_text(
                     "Photons of the last iteration as points over the picture. Does not restart the estimate. (G)",
                 )
@@ -383,11 +383,11 @@ fn whole(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
     table(ui, "whole", |ui| {
         let last = viewer.engine().history(|history| history.records.last().copied());
         let count = |n: u32| n.to_string();
-        row(ui, "Photons", last.map(|l| count(l.n_photons)), "Stored in the last iteration");
-        row(ui, "Paths", last.map(|l| count(l.n_paths)), "Photon paths of an iteration");
+        row(ui, "Photons emitted", last.map(|l| count(l.n_paths)), "By the lamps, an iteration");
+        row(ui, "Photons stored", last.map(|l| count(l.n_photons)), "In the last iteration");
         let each =
             last.filter(|l| l.n_paths > 0).map(|l| format!("{:.3}", f64::from(l.n_photons) / f64::from(l.n_paths)));
-        row(ui, "Photons a path", each, "Stored, on average");
+        row(ui, "Stored of each", each, "Photons stored for one that is emitted, on average");
         row(ui, "Mean radius", mean_radius.map(length), "Of the pixels' estimates, now");
     });
     if let Some(painted) = painted {

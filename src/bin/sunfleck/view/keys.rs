@@ -77,6 +77,15 @@ pub const SHORTCUTS: &[Shortcut] = &[
     }),
 ];
 
+/// A line around what has the keys, which egui itself hardly marks; a field that is typed into has a cursor.
+pub fn mark_focus(ctx: &egui::Context) {
+    let focused = ctx.memory(|memory| memory.focused()).and_then(|id| ctx.read_response(id));
+    let Some(response) = focused.filter(|_| !ctx.text_edit_focused()) else { return };
+    let stroke = egui::Stroke::new(1.5, ctx.global_style().visuals.selection.stroke.color);
+    let rect = response.interact_rect.expand(1.0);
+    ctx.layer_painter(response.layer_id).rect_stroke(rect, 3.0, stroke, egui::StrokeKind::Outside);
+}
+
 fn scale_photons(ui: &egui::Ui, viewer: &mut Viewer, factor: f64) {
     viewer.edit(ui, "photons", |settings| {
         let now = settings.photons.map_or(Params::new(1, 1).n_paths, |n| n.0);

@@ -17,6 +17,7 @@ mod help;
 mod inspect;
 mod keys;
 pub mod measure;
+mod memory;
 mod messages;
 mod offscreen;
 mod picture;
@@ -40,6 +41,7 @@ use crate::progress::Progress;
 use app::Viewer;
 
 pub fn run(args: &ViewArgs) -> Result<ExitCode> {
+    memory::give_back_large();
     devices::use_threads(args.device.threads)?;
     let device = devices::open(&args.device, &Progress::new(false))?;
     let first = app::First::resolve(args)?;

@@ -6,7 +6,7 @@ use sunfleck::scene::settings::{CameraSettings, Settings};
 use sunfleck::scene::{Camera, Projection, Scene};
 
 use super::number::{Number, drag_sized, metres, slider};
-use super::widgets::{Name, named, row};
+use super::widgets::{Name, list, named, row};
 use crate::progress::decimals;
 use crate::view::app::Viewer;
 use crate::view::engine::Message;
@@ -101,14 +101,13 @@ fn which(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene) {
     let mut picked = None;
     let reset = row(ui, CAMERA, !is_the_files, |ui| {
         let combo = egui::ComboBox::from_id_salt("camera").width(ui.available_width()).selected_text(text).truncate();
-        let inside = combo.show_ui(ui, |ui| {
+        list(ui, combo, |ui| {
             for (i, camera) in scene.cameras.iter().enumerate() {
                 if ui.selectable_label(current == Some(i), title(camera, i)).clicked() {
                     picked = Some(i);
                 }
             }
-        });
-        inside.response
+        })
     });
     if let Some(i) = picked {
         let camera = chosen(scene, i);

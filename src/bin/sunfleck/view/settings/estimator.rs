@@ -12,8 +12,8 @@ use crate::view::app::Viewer;
 
 const PHOTONS: Name = Name {
     name: "Photons",
-    hint: "Photon paths emitted an iteration: 500k, 1.5M. More of them make an iteration slower and its picture less \
-           noisy. Restarts the estimate.",
+    hint: "Photons emitted an iteration: 500k, 1.5M. More of them make an iteration slower and its picture less noisy. \
+           Restarts the estimate.",
 };
 const ALPHA: Name = Name {
     name: "Alpha",

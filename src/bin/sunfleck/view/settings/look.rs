@@ -6,7 +6,7 @@ use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::settings::{MAX_EXPOSURE, MAX_SIDE, Settings, Size};
 
 use super::number::{Number, slider, whole};
-use super::widgets::{Name, choice, named, row};
+use super::widgets::{Name, choice, menu, named, row};
 use crate::view::app::Viewer;
 
 const SIZE: Name = Name { name: "Size", hint: "Width and height of the picture, pixels. Restarts the estimate." };
@@ -76,14 +76,14 @@ fn size(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
         response
     });
     ui.horizontal_wrapped(|ui| {
-        let presets = ui.menu_button("Presets", |ui| {
+        let presets = menu(ui, "Presets", |ui| {
             for (preset, name) in PRESETS {
                 if ui.button(name).clicked() {
                     chosen = Some(preset);
                 }
             }
         });
-        presets.response.on_hover_text("Usual sizes, pixels. Restarts the estimate.");
+        presets.on_hover_text("Usual sizes, pixels. Restarts the estimate.");
         let area = viewer.picture.area.map(|area| area.size() * ui.pixels_per_point());
         let hint = "As many pixels as there is room for in the window, now. Restarts the estimate.";
         if ui.add_enabled(area.is_some(), egui::Button::new("As large as the window")).on_hover_text(hint).clicked() {

@@ -9,7 +9,7 @@ use sunfleck::scene::{Material, Scene};
 use super::color::color;
 use super::number::{Number, Scale};
 use super::scene::tidy;
-use super::widgets::{Name, row};
+use super::widgets::{Name, list, row};
 use crate::view::app::Viewer;
 
 const MATERIAL: Name = Name { name: "Material", hint: "Click on a surface in the picture, or choose here." };
@@ -53,7 +53,7 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     row(ui, MATERIAL, false, |ui| {
         let text = viewer.selected.map_or_else(|| "none".to_owned(), title);
         let combo = egui::ComboBox::from_id_salt("material").width(ui.available_width()).selected_text(text).truncate();
-        let inside = combo.show_ui(ui, |ui| {
+        list(ui, combo, |ui| {
             // Those in sight alone: a scene may have thousands.
             let area = egui::ScrollArea::vertical().max_height(ui.spacing().combo_height).auto_shrink([false, true]);
             area.show_rows(ui, ui.spacing().interact_size.y, scene.materials.len(), |ui, range| {
@@ -63,8 +63,7 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
                     }
                 }
             });
-        });
-        inside.response
+        })
     });
     viewer.selected = picked.or(viewer.selected);
     let Some(index) = viewer.selected else {

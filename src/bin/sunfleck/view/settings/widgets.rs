@@ -76,18 +76,51 @@ pub fn named(response: Response, name: &str) -> Response {
 pub fn choice<T: Copy + PartialEq>(ui: &mut Ui, id: &str, value: &mut T, all: &[(T, &str, &str)]) -> Response {
     let text = all.iter().find(|(of, ..)| of == value).map_or("", |(_, text, _)| text);
     let mut changed = false;
-    let mut response = egui::ComboBox::from_id_salt(id)
-        .width(ui.available_width())
-        .selected_text(text)
-        .truncate()
-        .show_ui(ui, |ui| {
-            for (of, text, hint) in all {
-                changed |= ui.selectable_value(value, *of, *text).on_hover_text(*hint).changed();
-            }
-        })
-        .response;
+    let combo = egui::ComboBox::from_id_salt(id).width(ui.available_width()).selected_text(text).truncate();
+    let mut response = list(ui, combo, |ui| {
+        for (of, text, hint) in all {
+            changed |= ui.selectable_value(value, *of, *text).on_hover_text(*hint).changed();
+        }
+    });
     if changed {
         response.mark_changed();
     }
     response
+}
+
+/// A list that opens.
+pub fn list(ui: &mut Ui, combo: egui::ComboBox, items: impl FnOnce(&mut Ui)) -> Response {
+    let shown = combo.show_ui(ui, |ui| close_on_choice(ui, items));
+    keep_keys(ui, &shown.response, shown.inner.is_some());
+    shown.response
+}
+
+/// A menu that opens.
+pub fn menu(ui: &mut Ui, name: &str, items: impl FnOnce(&mut Ui)) -> Response {
+    let shown = ui.menu_button(name, |ui| close_on_choice(ui, items));
+    keep_keys(ui, &shown.response, shown.inner.is_some());
+    shown.response
+}
+
+/// Choosing by keyboard closes what is open, which egui 0.37 leaves to the mouse.
+fn close_on_choice(ui: &mut Ui, items: impl FnOnce(&mut Ui)) {
+    items(ui);
+    let focused = ui.memory(|memory| memory.focused()).and_then(|id| ui.ctx().read_response(id));
+    if focused.is_some_and(|item| item.layer_id == ui.layer_id() && item.clicked()) {
+        ui.close();
+    }
+}
+
+/// What was opened and used by keyboard has the keys again when it closes, however it does: they are no shortcuts then.
+pub fn keep_keys(ui: &Ui, opener: &Response, is_open: bool) {
+    let id = opener.id.with("has the keys");
+    let had_keys = ui.data_mut(|data| data.remove_temp(id)).unwrap_or(false);
+    let is_clicked = ui.input(|i| i.pointer.any_pressed() || i.pointer.any_released());
+    // Escape takes the focus from what is in it as it closes it.
+    let has_keys = !is_clicked && (had_keys || ui.memory(|memory| memory.focused().is_some()));
+    if is_open {
+        ui.data_mut(|data| data.insert_temp(id, has_keys));
+    } else if had_keys && has_keys {
+        opener.request_focus();
+    }
 }

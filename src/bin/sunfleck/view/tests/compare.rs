@@ -89,16 +89,20 @@ fn the_range_of_a_difference_can_be_given() {
     choose(&mut window, "Given");
     assert_eq!(end(&mut window), Some(0.1));
     assert!(window.shows("to 0.1, as given"));
-    for (typed, expected) in [("0,4", 0.4), ("0", 1e-30), ("2.5e-3", 0.0025)] {
+    for (typed, expected) in [("0,4", Some(0.4)), ("2.5e-3", Some(0.0025)), ("0", None)] {
         window.harness.get_by_role_and_label(Role::SpinButton, "Range").focus();
         window.steps(2);
         window.harness.input_mut().events.push(Event::Text(typed.to_owned()));
         window.step();
         window.press(Modifiers::NONE, Key::Enter);
         wait(&mut window);
-        assert_eq!(end(&mut window), Some(expected), "{typed}");
+        assert_eq!(end(&mut window), expected, "{typed}");
+        if let Some(expected) = expected {
+            assert!(window.shows(&format!("to {expected}, as given")), "{typed}");
+        }
     }
-    assert!(window.shows("to 0.0025, as given"));
+    assert!(window.shows("to 0.1, automatic"));
+    choose(&mut window, "Given");
     choose(&mut window, "Automatic");
     assert_eq!(end(&mut window), None);
     assert!(window.shows("to 0.1, automatic"));

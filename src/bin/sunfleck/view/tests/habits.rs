@@ -7,7 +7,8 @@ use eframe::egui;
 use egui::{Event, Key, Modifiers, Role, ViewportCommand};
 use egui_kittest::kittest::Queryable;
 use sunfleck::output::difference::Measure;
-use sunfleck::scene::settings::Count;
+use sunfleck::output::tonemap::ToneMap;
+use sunfleck::scene::settings::{Count, Size};
 
 use super::{NoPixels, Window};
 use crate::view::app::Place;
@@ -449,6 +450,78 @@ fn shortcuts_work_whatever_has_the_focus() {
     window.press(Modifiers::NONE, Key::Space);
     window.steps(2);
     assert_eq!((window.viewer().wanted.steps, window.viewer().wanted.restarts), (steps + 1, restarts));
+}
+
+/// Else Space, meant for a list or a menu, would restart.
+#[test]
+fn what_opens_by_keyboard_keeps_the_keys() {
+    let mut window = Window::with_picture();
+    let focused = |window: &Window| window.harness.ctx.memory(|memory| memory.focused());
+    for label in ["Kernel", "Show"] {
+        window.harness.get_by_role_and_label(Role::ComboBox, label).focus();
+        window.steps(2);
+        let list = focused(&window);
+        assert!(list.is_some(), "{label}");
+        for last in [Key::Space, Key::Escape] {
+            window.press(Modifiers::NONE, Key::Space);
+            window.steps(3);
+            assert!(egui::Popup::is_any_open(&window.harness.ctx), "{label}");
+            window.press(Modifiers::NONE, Key::ArrowDown);
+            window.steps(2);
+            assert_ne!(focused(&window), list, "{label}");
+            window.press(Modifiers::NONE, last);
+            window.steps(4);
+            assert!(!egui::Popup::is_any_open(&window.harness.ctx), "{label}");
+            assert_eq!(focused(&window), list, "{label} {last:?}");
+        }
+    }
+    // A menu: its items do what they do, once.
+    window.press(Modifiers::NONE, Key::T);
+    window.press(Modifiers::NONE, Key::Minus);
+    for (name, label) in [("Edit", "Undo"), ("Presets", "640 × 360")] {
+        window.harness.get_by_role_and_label(Role::Button, name).focus();
+        window.steps(2);
+        let opener = focused(&window);
+        window.press(Modifiers::NONE, Key::Space);
+        window.steps(3);
+        assert!(window.shows(label), "{name}");
+        window.press(Modifiers::NONE, Key::ArrowDown);
+        window.steps(2);
+        window.press(Modifiers::NONE, Key::Enter);
+        window.steps(4);
+        assert_eq!((window.shows(label), focused(&window)), (false, opener), "{name}");
+    }
+    let now = window.viewer().edits.now().clone();
+    let expected = (Some(ToneMap::Agx), Some(Count(500)), Some(Size([640, 360])));
+    assert_eq!((now.tonemap, now.photons, now.size), expected);
+    assert_eq!(window.viewer().wanted.restarts, 0);
+    // By the mouse, nothing has them.
+    window.press(Modifiers::NONE, Key::Escape);
+    window.harness.get_by_role_and_label(Role::ComboBox, "Kernel").click();
+    window.steps(4);
+    window.harness.get_by_label("Constant").click();
+    window.steps(4);
+    assert_eq!((egui::Popup::is_any_open(&window.harness.ctx), focused(&window)), (false, None));
+}
+
+#[test]
+fn what_has_the_keys_is_marked() {
+    let mut window = Window::with_picture();
+    let marked = |window: &Window, rect: egui::Rect| {
+        let color = window.harness.ctx.global_style().visuals.selection.stroke.color;
+        window.harness.output().shapes.iter().any(|clipped| match &clipped.shape {
+            egui::Shape::Rect(shape) => shape.stroke.color == color && shape.rect == rect.expand(1.0),
+            _ => false,
+        })
+    };
+    for (role, label) in [(Role::CheckBox, "Stop at seconds"), (Role::Button, "Step"), (Role::ComboBox, "Kernel")] {
+        let node = window.harness.get_by_role_and_label(role, label);
+        let rect = node.rect();
+        assert!(!marked(&window, rect), "{label}");
+        node.focus();
+        window.steps(2);
+        assert!(marked(&window, rect), "{label}");
+    }
 }
 
 #[test]
