@@ -1,7 +1,9 @@
-//! `shaders/layout.wgsl` says the same as `src/layout.rs`, and every shader is valid.
+//! `shaders/layout.wgsl` says the same as `src/layout.rs`, and every shader is valid, on every system.
 
 use std::collections::BTreeMap;
 
+use naga::back::{glsl, hlsl, msl};
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{ScalarKind, TypeInner};
 use sunfleck::gpu::shaders;
 
@@ -126,19 +128,62 @@ fn constants_agree() {
     assert_eq!(rust, wgsl);
 }
 
+fn validated(name: &str) -> (naga::Module, ModuleInfo) {
+    let module = wgsl_module(name);
+    let allowed = match shaders::needs_ray_queries(name) {
+        true => Capabilities::RAY_QUERY,
+        false => Capabilities::empty(),
+    };
+    match Validator::new(ValidationFlags::all(), allowed).validate(&module) {
+        Ok(info) => (module, info),
+        Err(error) => panic!("{name}: {}", error.emit_to_string(&shaders::source(name))),
+    }
+}
+
+/// In the languages of Metal, Direct3D 12 and OpenGL ES too, which no machine that runs these tests may have: the oldest
+/// versions that wgpu asks for.
+#[test]
+fn every_shader_can_be_translated() {
+    for name in shaders::modules() {
+        let (module, info) = validated(name);
+        let has_ray_queries = shaders::needs_ray_queries(name);
+        for entry in &module.entry_points {
+            let (stage, called) = (naga::ShaderStage::Compute, entry.name.clone());
+
+            let lang_version = if has_ray_queries { (2, 4) } else { (2, 0) };
+            let options = msl::Options { lang_version, fake_missing_bindings: true, ..Default::default() };
+            let pipeline = msl::PipelineOptions { entry_point: Some((stage, called.clone())), ..Default::default() };
+            let (_, translated) = msl::write_string(&module, &info, &options, &pipeline)
+                .unwrap_or_else(|error| panic!("{name}, {called}, Metal: {error}"));
+            assert!(translated.entry_point_names[0].is_ok(), "{name}, {called}, Metal");
+
+            let shader_model = if has_ray_queries { hlsl::ShaderModel::V6_5 } else { hlsl::ShaderModel::V5_1 };
+            let options = hlsl::Options { shader_model, fake_missing_bindings: true, ..Default::default() };
+            let pipeline = hlsl::PipelineOptions { entry_point: Some((stage, called.clone())) };
+            let mut text = String::new();
+            let translated = hlsl::Writer::new(&mut text, &options, &pipeline)
+                .write(&module, &info, None)
+                .unwrap_or_else(|error| panic!("{name}, {called}, Direct3D: {error}"));
+            assert!(translated.entry_point_names[0].is_ok(), "{name}, {called}, Direct3D");
+
+            if !has_ray_queries {
+                let version = glsl::Version::Embedded { version: 310, is_webgl: false };
+                let options = glsl::Options { version, ..Default::default() };
+                let pipeline =
+                    glsl::PipelineOptions { shader_stage: stage, entry_point: called.clone(), multiview: None };
+                glsl::Writer::new(&mut String::new(), &module, &info, &options, &pipeline, Default::default())
+                    .and_then(|mut writer| writer.write())
+                    .unwrap_or_else(|error| panic!("{name}, {called}, OpenGL: {error}"));
+            }
+        }
+    }
+}
+
 #[test]
 fn every_shader_is_valid() {
     for name in shaders::modules() {
-        let module = wgsl_module(name);
+        let (module, _) = validated(name);
         assert!(!module.entry_points.is_empty(), "{name} has no entry point");
-        let flags = naga::valid::ValidationFlags::all();
-        let allowed = match shaders::needs_ray_queries(name) {
-            true => naga::valid::Capabilities::RAY_QUERY,
-            false => naga::valid::Capabilities::empty(),
-        };
-        if let Err(error) = naga::valid::Validator::new(flags, allowed).validate(&module) {
-            panic!("{name}: {}", error.emit_to_string(&shaders::source(name)));
-        }
         for entry in &module.entry_points {
             let threads: u32 = entry.workgroup_size.iter().product();
             assert_eq!(threads, 64, "{name}: {}", entry.name);

@@ -371,7 +371,7 @@ impl Viewer {
     /// What renders this picture on the command line.
     pub fn command(&self) -> Option<String> {
         let opened = self.editing.as_ref()?;
-        let iterations = self.now.frame.as_ref().map_or(1, |frame| frame.film.n_iterations);
+        let iterations = self.now.snapshot.as_ref().map_or(1, |snapshot| snapshot.film.n_iterations);
         let flags = self.engine.device_flags();
         // It may be pasted anywhere. A shipped scene has no place.
         let Source { name, canonical, .. } = &opened.source;
@@ -512,14 +512,14 @@ impl Viewer {
         self.now = self.engine.now();
         if self.now.opened.as_ref().is_some_and(|opened| Some(&opened.choice) != self.wanted.scene.as_ref()) {
             // Left of a scene that is not wanted any more, until a stage of it comes to its end.
-            (self.now.opened, self.now.frame, self.now.painted) = (None, None, None);
+            (self.now.opened, self.now.snapshot, self.now.painted) = (None, None, None);
             self.now.phase = if self.wanted.scene.is_some() { Phase::Loading } else { Phase::Empty };
         }
-        if let Some(frame) = self.now.frame.as_ref().filter(|frame| !frame.is_preview) {
-            self.iteration_seconds = frame.seconds / f64::from(frame.film.n_iterations.max(1));
+        if let Some(snapshot) = self.now.snapshot.as_ref().filter(|snapshot| !snapshot.is_preview) {
+            self.iteration_seconds = snapshot.seconds / f64::from(snapshot.film.n_iterations.max(1));
         }
         if let Some(painted) = &self.now.painted {
-            self.timing.see(Instant::now(), painted.frame.estimate);
+            self.timing.see(Instant::now(), painted.snapshot.estimate);
         }
         let most_side = ui.input(|i| i.max_texture_side);
         if self.most_side != most_side {
@@ -569,7 +569,7 @@ impl Viewer {
         }
         let title = match &self.wanted.scene {
             Some(choice) => {
-                let n = self.now.frame.as_ref().map_or(0, |frame| frame.film.n_iterations);
+                let n = self.now.snapshot.as_ref().map_or(0, |snapshot| snapshot.film.n_iterations);
                 format!("{} – {} – Sunfleck", choice.name, crate::progress::iterations(n))
             }
             None => "Sunfleck".to_owned(),

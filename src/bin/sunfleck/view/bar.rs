@@ -7,7 +7,7 @@ use egui::{Button, DragValue};
 use sunfleck::scene::settings::parse_count;
 
 use super::app::Viewer;
-use super::engine::{Frame, Limits, Phase};
+use super::engine::{Limits, Phase, Snapshot};
 use super::files;
 use super::settings::widgets::{keep_keys, menu};
 use crate::progress;
@@ -185,14 +185,15 @@ fn limit(ui: &mut egui::Ui, mut is_on: bool, name: &str, help: &str, number: Dra
 
 /// How far it is on the way to the limit that comes first.
 fn progress_bar(ui: &mut egui::Ui, viewer: &Viewer) {
-    let is_of_now = |frame: &&Arc<Frame>| !frame.is_preview && frame.estimate == viewer.now.estimate;
-    let Some(frame) = viewer.now.frame.as_ref().filter(is_of_now) else { return };
+    let is_of_now = |snapshot: &&Arc<Snapshot>| !snapshot.is_preview && snapshot.estimate == viewer.now.estimate;
+    let Some(snapshot) = viewer.now.snapshot.as_ref().filter(is_of_now) else { return };
     let noise = viewer.engine().history(|history| history.estimated.last().map(|measured| measured.rel_mse));
-    let alpha = f64::from(frame.params.alpha);
-    let Some(left) = seconds_left(&viewer.wanted.limits, frame.film.n_iterations, frame.seconds, noise, alpha) else {
+    let alpha = f64::from(snapshot.params.alpha);
+    let Some(left) = seconds_left(&viewer.wanted.limits, snapshot.film.n_iterations, snapshot.seconds, noise, alpha)
+    else {
         return;
     };
-    let done = if left > 0.0 { frame.seconds / (frame.seconds + left) } else { 1.0 };
+    let done = if left > 0.0 { snapshot.seconds / (snapshot.seconds + left) } else { 1.0 };
     let text = match left > 0.0 {
         true => format!("{:.0} %, {} left", (100.0 * done).floor(), progress::seconds(left)),
         false => "done".to_owned(),
@@ -234,19 +235,19 @@ pub fn status(ui: &mut egui::Ui, viewer: &Viewer) {
             Phase::Failed(_) => "Failed",
         };
         ui.label(phase);
-        if let Some(frame) = &now.frame {
-            let [width, height] = frame.params.size;
-            let n = frame.film.n_iterations;
+        if let Some(snapshot) = &now.snapshot {
+            let [width, height] = snapshot.params.size;
+            let n = snapshot.film.n_iterations;
             ui.separator();
-            ui.label(format!("{}, {}", progress::iterations(n), progress::seconds(frame.seconds)));
+            ui.label(format!("{}, {}", progress::iterations(n), progress::seconds(snapshot.seconds)));
             ui.separator();
             ui.label(format!("{width}×{height}"));
             ui.separator();
-            ui.label(format!("radius {}", progress::length(frame.radius)));
-            if frame.is_preview {
+            ui.label(format!("radius {}", progress::length(snapshot.radius)));
+            if snapshot.is_preview {
                 ui.separator();
                 ui.label("preview");
-            } else if frame.estimate != now.estimate {
+            } else if snapshot.estimate != now.estimate {
                 ui.separator();
                 ui.label("picture of before");
             }

@@ -142,11 +142,13 @@ pub fn section(ui: &mut egui::Ui, viewer: &mut Viewer) {
         if ui.button("Open …").on_hover_text("An .exr as the reference").clicked() {
             files::ask_reference(viewer);
         }
-        let frame = viewer.now.frame.clone().filter(|frame| !frame.is_preview);
-        let pin = ui.add_enabled(frame.is_some(), egui::Button::new("Pin"));
-        if let (true, Some(frame)) = (pin.on_hover_text("The picture as it is now as the reference").clicked(), frame) {
-            let name = format!("picture after {}", crate::progress::iterations(frame.film.n_iterations));
-            let reference = Reference { name, picture: frame.picture() };
+        let snapshot = viewer.now.snapshot.clone().filter(|snapshot| !snapshot.is_preview);
+        let pin = ui.add_enabled(snapshot.is_some(), egui::Button::new("Pin"));
+        if let (true, Some(snapshot)) =
+            (pin.on_hover_text("The picture as it is now as the reference").clicked(), snapshot)
+        {
+            let name = format!("picture after {}", crate::progress::iterations(snapshot.film.n_iterations));
+            let reference = Reference { name, picture: snapshot.picture() };
             viewer.engine().set_reference(Some(Arc::new(reference)));
         }
         let clear = ui.add_enabled(reference.is_some(), egui::Button::new("Clear"));

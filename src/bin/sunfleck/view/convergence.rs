@@ -167,7 +167,7 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
         (key, (made_of != Some(key)).then(|| Sample::of(history)))
     };
     let (key, sample) = viewer.engine().history(read);
-    let alpha = viewer.now.frame.as_ref().map_or(2.0 / 3.0, |frame| f64::from(frame.params.alpha));
+    let alpha = viewer.now.snapshot.as_ref().map_or(2.0 / 3.0, |snapshot| f64::from(snapshot.params.alpha));
     let view = &mut viewer.convergence;
     if let Some(sample) = sample {
         view.curves = KINDS.map(|kind| curves(kind, &sample, alpha, by_seconds));

@@ -22,7 +22,7 @@ pub fn show(ui: &egui::Ui, viewer: &mut Viewer, area: egui::Rect) {
                 if ui.button("Try again").on_hover_text(again).clicked() {
                     viewer.retry();
                 }
-                let save = ui.add_enabled(viewer.now.frame.is_some(), egui::Button::new("Save picture …"));
+                let save = ui.add_enabled(viewer.now.snapshot.is_some(), egui::Button::new("Save picture …"));
                 if save.on_hover_text("The last picture that was shown (Ctrl+S)").clicked() {
                     files::save(viewer);
                 }

@@ -26,7 +26,7 @@ const NO_VIEW: &str =
 
 /// Radius of now over the first.
 fn shrunk(painted: &Painted) -> f32 {
-    painted.frame.radius / painted.frame.first_radius.max(f32::MIN_POSITIVE)
+    painted.snapshot.radius / painted.snapshot.first_radius.max(f32::MIN_POSITIVE)
 }
 
 impl Viewer {
@@ -134,11 +134,11 @@ fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
     let view = Some(painted.painting.view).filter(|_| painted.difference().is_none());
     if painted.lacks() {
         ui.weak("Waiting for an iteration's photons …");
-    } else if view == Some(View::Variance) && painted.frame.film.n_iterations < 2 {
+    } else if view == Some(View::Variance) && painted.snapshot.film.n_iterations < 2 {
         ui.weak("One iteration has no variance yet.");
     }
     let needs = view.map(View::needs).filter(|needs| needs.is_any() && !painted.lacks());
-    if let (Some(needs), Some(insides)) = (needs, &painted.frame.insides) {
+    if let (Some(needs), Some(insides)) = (needs, &painted.snapshot.insides) {
         let text = match insides.split.as_ref().filter(|_| needs.split).map(|split| split.n_iterations) {
             None => "Of the last iteration".to_owned(),
             Some(1) => "Of one iteration".to_owned(),
@@ -177,10 +177,10 @@ fn view(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
             );
         });
     }
-    if let (Some(color_by), Some(insides)) = (painted.painting.photons, &painted.frame.insides) {
+    if let (Some(color_by), Some(insides)) = (painted.painting.photons, &painted.snapshot.insides) {
         match color_by {
             ColorBy::Power => {
-                let per_path = 1.0 / painted.frame.params.n_paths.max(1) as f32;
+                let per_path = 1.0 / painted.snapshot.params.n_paths.max(1) as f32;
                 let range = painted.powers.unwrap_or([1.0; 2]).map(|power| power * per_path);
                 let map = |t| rgb(inspect::power_color(t));
                 bar(ui, "Power of a photon", range, true, "W a photon", map);
@@ -236,12 +236,12 @@ fn cursor(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
     let at = painted.zip(viewer.picture.hovered);
     let film = at.and_then(|(painted, [x, y])| {
         let i = y * painted.size[0] + x;
-        let pixel = painted.frame.film.pixels.get(i).filter(|_| x < painted.size[0])?;
+        let pixel = painted.snapshot.film.pixels.get(i).filter(|_| x < painted.size[0])?;
         Some((painted, i, [pixel[0], pixel[1], pixel[2]], pixel[3]))
     });
     let three = |rgb: [f32; 3]| rgb.map(short).join(" ");
     table(ui, "cursor", |ui| {
-        let pixel = at.map(|(painted, [x, y])| match painted.frame.is_preview {
+        let pixel = at.map(|(painted, [x, y])| match painted.snapshot.is_preview {
             true => format!("{x}, {y} of {}×{}", painted.size[0], painted.size[1]),
             false => format!("{x}, {y}"),
         });
@@ -273,7 +273,7 @@ fn cursor(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
     ui.separator();
     let hit = at.and_then(|(painted, [x, y])| {
         let centre = Vec2::new(x as f32, y as f32) + 0.5;
-        inspect::pick(&painted.frame.scene, &painted.frame.view(), centre)
+        inspect::pick(&painted.snapshot.scene, &painted.snapshot.view(), centre)
     });
     table(ui, "hit", |ui| {
         row(ui, "Depth", hit.map(|hit| length(hit.depth)), "Of what is seen first, along the view");
@@ -289,7 +289,7 @@ fn cursor(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
     });
     ui.separator();
     table(ui, "photons", |ui| {
-        let insides = film.and_then(|(painted, i, ..)| Some((painted.frame.insides.as_ref()?, i)));
+        let insides = film.and_then(|(painted, i, ..)| Some((painted.snapshot.insides.as_ref()?, i)));
         let gathered =
             insides.and_then(|(insides, i)| insides.split.as_ref()?.pixels.get(i)).map(|parts| short(parts.gathered));
         row(
@@ -299,11 +299,11 @@ fn cursor(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
             "Gathered by an iteration, on average, while the view is of gathered photons or of a kind of light",
         );
         let radius = film.filter(|_| hit.is_some()).and_then(|(painted, i, ..)| {
-            let FirstRadii { each, gathers } = &*painted.frame.first_radii;
+            let FirstRadii { each, gathers } = &*painted.snapshot.first_radii;
             gathers.get(i)?.then(|| each[i] * shrunk(painted))
         });
         row(ui, "Radius", radius.map(length), "Of the estimate, now");
-        let variance = film.and_then(|(painted, _, _, m2)| variance(m2, painted.frame.film.n_iterations));
+        let variance = film.and_then(|(painted, _, _, m2)| variance(m2, painted.snapshot.film.n_iterations));
         row(ui, "Variance", variance.map(short), "Of the mean luminance, estimated");
         let error = variance.zip(radiance_of(film)).filter(|(_, y)| *y > 0.0).map(|(v, y)| v.sqrt() / y);
         let error = error.map(|e| format!("{} %", short(100.0 * e)));
@@ -379,7 +379,7 @@ fn selection(ui: &mut egui::Ui, viewer: &mut Viewer) {
 
 /// Of all pixels and photons.
 fn whole(ui: &mut egui::Ui, viewer: &mut Viewer, painted: Option<&Painted>) {
-    let mean_radius = painted.and_then(|painted| painted.frame.mean_radius);
+    let mean_radius = painted.and_then(|painted| painted.snapshot.mean_radius);
     table(ui, "whole", |ui| {
         let last = viewer.engine().history(|history| history.records.last().copied());
         let count = |n: u32| n.to_string();

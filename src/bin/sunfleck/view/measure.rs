@@ -168,8 +168,8 @@ impl<'a> Observer<'a> {
             frames.intervals.push(now - last);
             frames.work.extend(work.and_then(|seconds| Duration::try_from_secs_f32(seconds).ok()));
         }
-        if let Some(frame) = &viewer.now.frame {
-            let (estimate, n) = (frame.estimate, frame.film.n_iterations);
+        if let Some(snapshot) = &viewer.now.snapshot {
+            let (estimate, n) = (snapshot.estimate, snapshot.film.n_iterations);
             frames.iterations += if estimate == self.seen.0 { n.saturating_sub(self.seen.1) } else { n };
             self.seen = (estimate, n);
         }

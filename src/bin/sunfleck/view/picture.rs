@@ -120,8 +120,8 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
         return;
     };
     // A preview fills the place of the picture it stands for.
-    let size = painted.frame.as_ref().params.size;
-    let full = if painted.frame.is_preview { viewer.full_size().unwrap_or(size) } else { size };
+    let size = painted.snapshot.as_ref().params.size;
+    let full = if painted.snapshot.is_preview { viewer.full_size().unwrap_or(size) } else { size };
     let full = vec2(full[0] as f32, full[1] as f32);
     let rect = place(ui, viewer, area, full, &response);
     viewer.picture.rect = Some(rect);
@@ -163,10 +163,10 @@ fn click(ui: &egui::Ui, viewer: &mut Viewer, response: &egui::Response, rect: Re
         return;
     }
     let Some(point) = response.interact_pointer_pos() else { return };
-    let frame = &painted.frame;
+    let snapshot = &painted.snapshot;
     // In the middle of the pixel, as the panel that tells of it.
     let at = on_film(rect, painted.size, point).map(|at| at.floor() + 0.5);
-    let hit = at.and_then(|at| inspect::pick(&frame.scene, &frame.view(), at));
+    let hit = at.and_then(|at| inspect::pick(&snapshot.scene, &snapshot.view(), at));
     let n_materials = viewer.opened().map_or(0, |opened| opened.loaded.scene.materials.len());
     viewer.selected = hit.map(|hit| hit.material as usize).filter(|&index| index < n_materials);
     if let (true, Some(hit)) = (response.double_clicked_by(PointerButton::Primary), hit) {
@@ -181,7 +181,7 @@ fn click(ui: &egui::Ui, viewer: &mut Viewer, response: &egui::Response, rect: Re
 /// What the camera sees first, as it stands now, where `point` is in a picture shown at `rect`; world space, metres.
 fn under(viewer: &mut Viewer, rect: Rect, point: egui::Pos2) -> Option<Vec3> {
     let painted = Arc::clone(viewer.picture.painted()?);
-    let (scene, params) = (&painted.frame.scene, &painted.frame.params);
+    let (scene, params) = (&painted.snapshot.scene, &painted.snapshot.params);
     let camera = viewer.rig()?.camera().pack(params.size[0], params.size[1]);
     let view = inspect::View::new(camera, params.size, params.crop);
     let hit = inspect::pick(scene, &view, on_film(rect, painted.size, point)?)?;

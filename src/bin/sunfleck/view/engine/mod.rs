@@ -4,6 +4,7 @@
 //! The render thread compares what is wanted with what it has and does the least that leads there. What was wanted in
 //! between is never rendered, so that no queue of camera positions can build up.
 
+mod colours;
 mod history;
 mod paint;
 mod painting;
@@ -28,10 +29,11 @@ use sunfleck::ppm::Interrupt;
 use sunfleck::scene::load::Loaded;
 use sunfleck::scene::settings::Settings;
 
+pub use colours::{Legend, NOTHING, Values};
 pub use history::{History, Measured, Record, Series};
-pub use paint::{Comparison, Insides, Legend, NOTHING, Painted, Painting, Values, View};
+pub use paint::{Comparison, Insides, Painted, Painting, View};
 pub use saving::Save;
-pub use session::Frame;
+pub use session::Snapshot;
 use worker::Work;
 pub use worker::{is_asked_anew, is_other_scene};
 
@@ -197,7 +199,7 @@ struct Board {
     phase: Phase,
     device: String,
     opened: Option<Arc<Opened>>,
-    frame: Option<Arc<Frame>>,
+    snapshot: Option<Arc<Snapshot>>,
     painted: Option<Arc<Painted>>,
     history: History,
     messages: Vec<Message>,
@@ -306,7 +308,7 @@ pub struct Now {
     pub device: String,
     pub opened: Option<Arc<Opened>>,
     /// The newest film.
-    pub frame: Option<Arc<Frame>>,
+    pub snapshot: Option<Arc<Snapshot>>,
     /// The newest picture of it.
     pub painted: Option<Arc<Painted>>,
     pub reference: Option<Arc<Reference>>,
@@ -370,7 +372,7 @@ impl Engine {
     /// What other threads ask how many seconds the newest picture has taken.
     pub fn clock(&self) -> impl Fn() -> f64 + Send + Sync + 'static {
         let shared = Arc::clone(&self.shared);
-        move || shared.board().frame.as_ref().map_or(0.0, |frame| frame.seconds)
+        move || shared.board().snapshot.as_ref().map_or(0.0, |snapshot| snapshot.seconds)
     }
 
     /// What other threads write what there is with, and come back when that is done: for the end.
@@ -378,8 +380,8 @@ impl Engine {
         let shared = Arc::clone(&self.shared);
         move |save| {
             let ready = save.ready(&shared.board()).unwrap_or(Err("there is no picture yet"));
-            let frame = ready.map_err(Error::msg)?;
-            save.write(&frame).map(|_| ())
+            let snapshot = ready.map_err(Error::msg)?;
+            save.write(&snapshot).map(|_| ())
         }
     }
 
@@ -415,7 +417,7 @@ impl Engine {
             estimate: board.estimate,
             device: board.device.clone(),
             opened: board.opened.clone(),
-            frame: board.frame.clone(),
+            snapshot: board.snapshot.clone(),
             painted: board.painted.clone(),
             reference: board.reference.clone(),
         }

@@ -3,8 +3,7 @@
 use std::sync::Arc;
 
 use anyhow::Result;
-use eframe::egui::{Color32, ColorImage};
-use rayon::prelude::*;
+use eframe::egui::ColorImage;
 use sunfleck::inspect::{self, ColorBy, FirstHits};
 use sunfleck::layout::Photon;
 use sunfleck::output::Picture;
@@ -12,13 +11,13 @@ use sunfleck::output::compare::{Difference, compare};
 use sunfleck::output::convergence::Halves;
 use sunfleck::output::difference::{self, Measure};
 use sunfleck::output::display::{self, Look};
-use sunfleck::output::false_colour::{self, NOT_FINITE, Scale};
+use sunfleck::output::false_colour::{self, Scale};
 use sunfleck::output::flip::{self, flip};
 use sunfleck::output::histogram::Histogram;
 use sunfleck::output::tonemap::{ToneMap, srgb_encode};
-use sunfleck::ppm::film::luminance;
 
-use super::{Frame, Reference};
+use super::colours::{Colours, Legend, Values, far, image, in_false_colour, on_display, plain, reduced, scalar, stops};
+use super::{Reference, Snapshot};
 
 /// What is shown of a render.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -146,22 +145,6 @@ impl Insides {
     }
 }
 
-/// The numbers behind the colours.
-#[derive(Clone, Debug)]
-pub enum Values {
-    Rgb(Arc<Vec<[f32; 3]>>),
-    Scalar(Arc<Vec<f32>>),
-}
-
-/// What the colours of a scalar mean.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Legend {
-    pub range: [f32; 2],
-    pub log: bool,
-    /// Green to red about 0.
-    pub signed: bool,
-}
-
 /// What of `Wanted` a painting depends on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Painting {
@@ -193,7 +176,7 @@ pub struct Painted {
     /// Opaque; as the texture is made from it, so that the interface hands it on and copies nothing.
     pub image: Arc<ColorImage>,
     /// What it was made from.
-    pub frame: Arc<Frame>,
+    pub snapshot: Arc<Snapshot>,
     pub painting: Painting,
     /// Stops; found automatically if the look has none.
     pub exposure: f32,
@@ -243,7 +226,7 @@ impl Painted {
 
     /// Whether something is shown without what an iteration has to give to it first.
     pub fn lacks(&self) -> bool {
-        !self.painting.needs(self.difference().is_some()).are_met_by(self.frame.has())
+        !self.painting.needs(self.difference().is_some()).are_met_by(self.snapshot.has())
     }
 
     pub fn reduce(&mut self, most_side: Option<usize>) {
@@ -272,27 +255,16 @@ impl Painted {
     }
 }
 
-/// Luminance after exposure, about mid grey.
-fn stops(rgb: [f32; 3], exposure: f32) -> f32 {
-    (luminance(rgb).max(0.0) / false_colour::MID_GREY).log2() + exposure
-}
-
 /// The reference, if it has the picture's size.
-pub fn fitting<'a>(reference: Option<&'a Arc<Reference>>, frame: &Frame) -> Option<&'a Arc<Reference>> {
-    reference.filter(|r| (r.picture.size, r.picture.crop) == (frame.params.size, frame.params.crop))
+pub fn fitting<'a>(reference: Option<&'a Arc<Reference>>, snapshot: &Snapshot) -> Option<&'a Arc<Reference>> {
+    reference.filter(|r| (r.picture.size, r.picture.crop) == (snapshot.params.size, snapshot.params.crop))
 }
 
-/// 0 on a logarithmic scale, where there is nothing; not on the map. RGBA.
-pub const NOTHING: [u8; 4] = [72, 72, 72, 255];
-
-/// What [`View::Stops`] spans, about mid grey.
-const STOPS: [f32; 2] = [-8.0, 8.0];
-
-/// What is kept from frame to frame.
+/// What is kept from one snapshot to the next.
 #[derive(Default)]
 pub struct Painter {
     halves: (u64, Halves),
-    hits: Option<(Arc<Frame>, FirstHits)>,
+    hits: Option<(Arc<Snapshot>, FirstHits)>,
     reference: Option<ReferenceImage>,
 }
 
@@ -305,14 +277,6 @@ struct ReferenceImage {
     image: Arc<ColorImage>,
 }
 
-/// Colours, and what they stand for.
-struct Colours {
-    rgba: Vec<u8>,
-    values: Values,
-    legend: Option<Legend>,
-    mean: Option<f64>,
-}
-
 impl Painter {
     pub fn is_empty(&self) -> bool {
         self.hits.is_none() && self.reference.is_none() && self.halves.1 == Halves::default()
@@ -321,26 +285,31 @@ impl Painter {
     /// Error estimated from the halves, and measured against the reference, or why it cannot be.
     pub fn measure(
         &mut self,
-        frame: &Frame,
+        snapshot: &Snapshot,
         reference: Option<&Arc<Reference>>,
     ) -> (Option<f64>, Option<Result<Difference, String>>) {
         // What another scene left would keep that scene in memory.
-        self.hits = self.hits.take().filter(|(of, _)| Arc::ptr_eq(&of.scene, &frame.scene));
-        if frame.is_preview {
+        self.hits = self.hits.take().filter(|(of, _)| Arc::ptr_eq(&of.scene, &snapshot.scene));
+        if snapshot.is_preview {
             return (None, None);
         }
-        if self.halves.0 != frame.estimate {
-            self.halves = (frame.estimate, Halves::default());
+        if self.halves.0 != snapshot.estimate {
+            self.halves = (snapshot.estimate, Halves::default());
         }
-        self.halves.1.add(&frame.film);
-        let measured = fitting(reference, frame).map(|r| compare(&frame.picture(), &r.picture));
+        self.halves.1.add(&snapshot.film);
+        let measured = fitting(reference, snapshot).map(|r| compare(&snapshot.picture(), &r.picture));
         (self.halves.1.rel_mse(), measured)
     }
 
-    pub fn paint(&mut self, frame: &Arc<Frame>, reference: Option<Arc<Reference>>, painting: Painting) -> Painted {
-        let picture = frame.picture();
+    pub fn paint(
+        &mut self,
+        snapshot: &Arc<Snapshot>,
+        reference: Option<Arc<Reference>>,
+        painting: Painting,
+    ) -> Painted {
+        let picture = snapshot.picture();
         let exposure = painting.look.exposure_of(&picture.rgb);
-        let reference = self.reference(fitting(reference.as_ref(), frame), painting, exposure);
+        let reference = self.reference(fitting(reference.as_ref(), snapshot), painting, exposure);
         let histogram = Histogram::of(&picture.rgb, exposure);
         let mut problem = None;
         let compared = reference.as_ref().and_then(|(reference, _)| {
@@ -349,24 +318,24 @@ impl Painter {
         });
         let mut colours = match compared {
             Some(colours) => colours,
-            None => self.view(frame, picture, painting, exposure),
+            None => self.view(snapshot, picture, painting, exposure),
         };
         let mut powers = None;
-        if let (Some(color), Some(insides)) = (painting.photons, &frame.insides) {
+        if let (Some(color), Some(insides)) = (painting.photons, &snapshot.insides) {
             powers = (color == ColorBy::Power).then(|| inspect::power_range(&insides.photons));
             let style = inspect::Style { color, through: painting.hidden_photons, ..Default::default() };
-            let dots = inspect::draw(&insides.photons, self.hits(frame), &style);
+            let dots = inspect::draw(&insides.photons, self.hits(snapshot), &style);
             for (to, from) in colours.rgba.chunks_exact_mut(4).zip(&dots) {
                 if from[3] > 0 {
                     to[..3].copy_from_slice(&from[..3]);
                 }
             }
         }
-        let size = frame.params.film_size().map(|n| n as usize);
+        let size = snapshot.params.film_size().map(|n| n as usize);
         Painted {
             size,
             image: Arc::new(image(size, &colours.rgba)),
-            frame: Arc::clone(frame),
+            snapshot: Arc::clone(snapshot),
             painting,
             exposure,
             values: colours.values,
@@ -408,38 +377,31 @@ impl Painter {
         Some((Arc::clone(reference), image))
     }
 
-    fn view(&mut self, frame: &Arc<Frame>, picture: Picture, painting: Painting, exposure: f32) -> Colours {
-        let split = frame.insides.as_ref().and_then(|insides| insides.split.as_ref());
+    fn view(&mut self, snapshot: &Arc<Snapshot>, picture: Picture, painting: Painting, exposure: f32) -> Colours {
+        let split = snapshot.insides.as_ref().and_then(|insides| insides.split.as_ref());
         let part = |pick: fn(&inspect::Parts) -> [f32; 3]| {
             split.map(|split| split.pixels.iter().map(pick).collect::<Vec<_>>())
         };
         let as_picture = |rgb: Vec<[f32; 3]>| {
-            let picture = Picture { rgb, size: frame.params.size, crop: frame.params.crop, variance: None };
-            let rgba = on_display(&picture, exposure, painting.look.tonemap);
-            Colours { rgba, values: Values::Rgb(Arc::new(picture.rgb)), legend: None, mean: None }
+            let picture = Picture { rgb, size: snapshot.params.size, crop: snapshot.params.crop, variance: None };
+            Colours::of_picture(picture, exposure, painting.look.tonemap)
         };
         // Until the first iteration with photons has been read back, the picture stands for them.
         let lit = |rgb: Option<Vec<[f32; 3]>>, picture: Picture| as_picture(rgb.unwrap_or(picture.rgb));
         match painting.view {
             View::Picture => as_picture(picture.rgb),
-            View::Stops => {
-                let rgba = in_false_colour(&picture, exposure);
-                let values = picture.rgb.iter().map(|&rgb| stops(rgb, exposure)).collect();
-                let values = Values::Scalar(Arc::new(values));
-                let legend = Some(Legend { range: STOPS, log: false, signed: false });
-                Colours { rgba, values, legend, mean: None }
-            }
+            View::Stops => Colours::of_stops(&picture, exposure),
             View::Direct => lit(part(|p| p.direct), picture),
             View::Caustic => lit(part(|p| p.caustic), picture),
             View::Indirect => lit(part(|p| p.indirect), picture),
-            View::Albedo => plain(self.hits(frame).base_colors(), |rgb| rgb.map(srgb_encode)),
+            View::Albedo => plain(self.hits(snapshot).base_colors(), |rgb| rgb.map(srgb_encode)),
             // As in normal maps; black where nothing is hit.
-            View::Normal => plain(self.hits(frame).normals(), |n| match n {
+            View::Normal => plain(self.hits(snapshot).normals(), |n| match n {
                 [0.0, 0.0, 0.0] => n,
                 _ => n.map(|c| 0.5 * c + 0.5),
             }),
             View::Depth => {
-                let mut colours = scalar(self.hits(frame).depths(), false);
+                let mut colours = scalar(self.hits(snapshot).depths(), false);
                 far(&mut colours);
                 colours
             }
@@ -447,84 +409,33 @@ impl Painter {
                 Some(split) => scalar(split.pixels.iter().map(|p| p.gathered).collect(), true),
                 None => as_picture(picture.rgb),
             },
-            View::NodesVisited => match frame.insides.as_ref().and_then(|insides| insides.nodes_visited.as_ref()) {
+            View::NodesVisited => match snapshot.insides.as_ref().and_then(|insides| insides.nodes_visited.as_ref()) {
                 Some(nodes) => scalar(nodes.iter().map(|&n| n as f32).collect(), false),
                 None => as_picture(picture.rgb),
             },
             View::Radius => {
-                let scale = frame.radius / frame.first_radius.max(f32::MIN_POSITIVE);
-                let radii = frame.first_radii.each.iter().zip(&frame.first_radii.gathers);
+                let scale = snapshot.radius / snapshot.first_radius.max(f32::MIN_POSITIVE);
+                let radii = snapshot.first_radii.each.iter().zip(&snapshot.first_radii.gathers);
                 scalar(radii.map(|(r, &gathers)| if gathers { r * scale } else { 0.0 }).collect(), true)
             }
             // One iteration has none.
-            View::Variance if frame.film.n_iterations < 2 => as_picture(picture.rgb),
-            View::Variance => scalar(frame.film.variance_of_mean(), true),
+            View::Variance if snapshot.film.n_iterations < 2 => as_picture(picture.rgb),
+            View::Variance => scalar(snapshot.film.variance_of_mean(), true),
         }
     }
 
-    fn hits(&mut self, frame: &Arc<Frame>) -> &FirstHits {
-        let same = |of: &Frame| {
-            Arc::ptr_eq(&of.scene, &frame.scene)
-                && of.camera == frame.camera
-                && (of.params.size, of.params.crop) == (frame.params.size, frame.params.crop)
+    fn hits(&mut self, snapshot: &Arc<Snapshot>) -> &FirstHits {
+        let same = |of: &Snapshot| {
+            Arc::ptr_eq(&of.scene, &snapshot.scene)
+                && of.camera == snapshot.camera
+                && (of.params.size, of.params.crop) == (snapshot.params.size, snapshot.params.crop)
         };
         let kept = self.hits.take().filter(|(of, _)| same(of));
-        let (_, hits) = self
-            .hits
-            .insert(kept.unwrap_or_else(|| (Arc::clone(frame), FirstHits::trace(&frame.scene, &frame.view()))));
+        let (_, hits) = self.hits.insert(
+            kept.unwrap_or_else(|| (Arc::clone(snapshot), FirstHits::trace(&snapshot.scene, &snapshot.view()))),
+        );
         hits
     }
-}
-
-/// As a PNG has it, but for pixels that are not finite: in the window they are [`NOT_FINITE`], in every view and comparison,
-/// where a tone curve makes black or white of them. A file is to be looked at without a legend, and keeps the curve's.
-fn on_display(picture: &Picture, exposure: f32, tonemap: ToneMap) -> Vec<u8> {
-    let mut rgba = vec![];
-    display::rgba8(picture, exposure, tonemap, &mut rgba);
-    mark(&mut rgba, &picture.rgb);
-    rgba
-}
-
-/// Luminance in stops.
-fn in_false_colour(picture: &Picture, exposure: f32) -> Vec<u8> {
-    let mut rgba = vec![];
-    false_colour::luminance_in_stops(&picture.rgb, exposure, STOPS, &mut rgba);
-    rgba
-}
-
-/// Marks the pixels of `rgba` whose values are not finite.
-fn mark(rgba: &mut [u8], values: &[[f32; 3]]) {
-    rgba.par_chunks_mut(1 << 14).zip(values.par_chunks(1 << 12)).for_each(|(rgba, values)| {
-        let pixels = rgba.chunks_exact_mut(4).zip(values).filter(|(_, rgb)| !rgb.iter().all(|c| c.is_finite()));
-        pixels.for_each(|(rgba, _)| rgba.copy_from_slice(&NOT_FINITE));
-    });
-}
-
-/// From bytes with an alpha of 255 to what textures are made from.
-fn image(size: [usize; 2], rgba: &[u8]) -> ColorImage {
-    let pixels = rgba.par_chunks_exact(4).with_min_len(1 << 14).map(|c| Color32::from_rgb(c[0], c[1], c[2])).collect();
-    ColorImage::new(size, pixels)
-}
-
-/// Means of squares of pixels, so many that no side is longer than `most` pixels.
-fn reduced(image: &ColorImage, most: usize) -> ColorImage {
-    let size = image.size;
-    let factor = size[0].max(size[1]).div_ceil(most.max(1)).max(1);
-    let small = size.map(|side| side.div_ceil(factor));
-    let mean = |i: usize| {
-        let [x0, y0] = [factor * (i % small[0]), factor * (i / small[0])];
-        let (mut sum, mut n) = ([0u32; 3], 0);
-        for y in y0..(y0 + factor).min(size[1]) {
-            for x in x0..(x0 + factor).min(size[0]) {
-                let [r, g, b, _] = image.pixels[y * size[0] + x].to_array();
-                sum.iter_mut().zip([r, g, b]).for_each(|(sum, c)| *sum += u32::from(c));
-                n += 1;
-            }
-        }
-        let [r, g, b] = sum.map(|sum| ((sum + n / 2) / n.max(1)) as u8);
-        Color32::from_rgb(r, g, b)
-    };
-    ColorImage::new(small, (0..small[0] * small[1]).into_par_iter().map(mean).collect())
 }
 
 /// Nothing if no comparison is wanted that is painted here.
@@ -567,35 +478,4 @@ fn compared(
         }
     };
     Ok(Some(Colours { rgba, values: Values::Scalar(Arc::new(values)), legend: Some(legend), mean }))
-}
-
-/// Numbers in false colour.
-fn scalar(values: Vec<f32>, log: bool) -> Colours {
-    let mut rgba = vec![];
-    let range = false_colour::scalar(&values, &Scale { range: None, log }, &mut rgba);
-    if log {
-        // It has no place on the scale, and is what one looks for: where nothing is found.
-        let zeros = rgba.chunks_exact_mut(4).zip(&values).filter(|(_, value)| **value == 0.0);
-        zeros.for_each(|(rgba, _)| rgba.copy_from_slice(&NOTHING));
-    }
-    let legend = Some(Legend { range, log, signed: false });
-    Colours { rgba, values: Values::Scalar(Arc::new(values)), legend, mean: None }
-}
-
-/// Where nothing is met it is endlessly far, which has no place on the scale.
-fn far(colours: &mut Colours) {
-    let Values::Scalar(depths) = &colours.values else { return };
-    for (rgba, depth) in colours.rgba.chunks_exact_mut(4).zip(depths.iter()) {
-        if *depth == f32::INFINITY {
-            rgba.copy_from_slice(&NOTHING);
-        }
-    }
-}
-
-/// Three numbers as the colour that `encoded` makes of them, in [0, 1].
-fn plain(values: Vec<[f32; 3]>, encoded: fn([f32; 3]) -> [f32; 3]) -> Colours {
-    let byte = |c: f32| (255.0 * c.clamp(0.0, 1.0) + 0.5) as u8;
-    let mut rgba: Vec<_> = values.iter().map(|&v| encoded(v).map(byte)).flat_map(|[r, g, b]| [r, g, b, 255]).collect();
-    mark(&mut rgba, &values);
-    Colours { rgba, values: Values::Rgb(Arc::new(values)), legend: None, mean: None }
 }

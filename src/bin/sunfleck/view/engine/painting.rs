@@ -9,7 +9,7 @@ use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::paint::{Painted, Painter, Painting, fitting};
-use super::{Board, Frame, Measured, Message, Phase, Reference, Shared, catch, is_same};
+use super::{Board, Measured, Message, Phase, Reference, Shared, Snapshot, catch, is_same};
 
 /// Between looks whether a picture is used by nobody any more.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
@@ -31,11 +31,11 @@ pub fn run(shared: &Shared) {
             }
             Next::Paint(task) => task,
         };
-        task.frame.is_taken.store(true, Ordering::Relaxed);
+        task.snapshot.is_taken.store(true, Ordering::Relaxed);
         let (began, painter) = (Instant::now(), &mut state.painter);
         let mut work = || {
-            let (estimated, figures) = painter.measure(&task.frame, task.reference.as_ref());
-            let mut painted = painter.paint(&task.frame, task.reference.clone(), task.painting);
+            let (estimated, figures) = painter.measure(&task.snapshot, task.reference.as_ref());
+            let mut painted = painter.paint(&task.snapshot, task.reference.clone(), task.painting);
             match figures {
                 Some(Ok(figures)) => painted.figures = Some(figures),
                 Some(Err(why)) => painted.problem = Some(why),
@@ -123,7 +123,7 @@ fn wait(shared: &Shared, state: &mut State) -> Option<Next> {
 
 /// What is to be painted.
 struct Task {
-    frame: Arc<Frame>,
+    snapshot: Arc<Snapshot>,
     reference: Option<Arc<Reference>>,
     painting: Painting,
     most_side: Option<usize>,
@@ -132,7 +132,7 @@ struct Task {
 impl Task {
     fn of(board: &Board) -> Option<Self> {
         Some(Self {
-            frame: board.frame.clone()?,
+            snapshot: board.snapshot.clone()?,
             reference: board.reference.clone(),
             painting: board.wanted.painting,
             most_side: board.most_side,
@@ -140,7 +140,7 @@ impl Task {
     }
 
     fn is(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.frame, &other.frame)
+        Arc::ptr_eq(&self.snapshot, &other.snapshot)
             && self.painting == other.painting
             && is_same(self.reference.as_ref(), other.reference.as_ref())
     }
@@ -148,18 +148,18 @@ impl Task {
     /// Whether `painted` is of something like it: as it is wanted, beside the reference that is wanted.
     fn is_like(&self, painted: &Painted) -> bool {
         let reference = painted.reference.as_ref().map(|(reference, _)| reference);
-        painted.painting == self.painting && is_same(reference, fitting(self.reference.as_ref(), &self.frame))
+        painted.painting == self.painting && is_same(reference, fitting(self.reference.as_ref(), &self.snapshot))
     }
 
     fn is_painted(&self, board: &Board) -> bool {
-        let is_it = |painted: &Arc<Painted>| Arc::ptr_eq(&painted.frame, &self.frame) && self.is_like(painted);
+        let is_it = |painted: &Arc<Painted>| Arc::ptr_eq(&painted.snapshot, &self.snapshot) && self.is_like(painted);
         board.painted.as_ref().is_some_and(is_it)
     }
 
     /// Whether it has nothing that is waited for: the film of more iterations of what is shown, and not the last.
     fn is_but_newer(&self, board: &Board) -> bool {
         let is_older = |painted: &Arc<Painted>| {
-            let (before, now) = (&painted.frame, &self.frame);
+            let (before, now) = (&painted.snapshot, &self.snapshot);
             before.estimate == now.estimate && before.has() == now.has() && self.is_like(painted)
         };
         board.phase == Phase::Rendering && board.painted.as_ref().is_some_and(is_older)
@@ -169,14 +169,14 @@ impl Task {
 /// Shows what was painted, and notes the errors of its film: estimated, and against the reference.
 fn publish(board: &mut Board, task: &Task, painted: Arc<Painted>, estimated: Option<f64>) {
     let figures = painted.figures;
-    let frame = &task.frame;
-    if board.frame.is_some() {
+    let snapshot = &task.snapshot;
+    if board.snapshot.is_some() {
         board.painted = Some(painted);
     }
-    if frame.estimate != board.estimate || frame.is_preview {
+    if snapshot.estimate != board.estimate || snapshot.is_preview {
         return;
     }
-    let (iteration, seconds) = (frame.film.n_iterations, frame.seconds);
+    let (iteration, seconds) = (snapshot.film.n_iterations, snapshot.seconds);
     let point = |rel_mse, trimmed| Measured { iteration, seconds, rel_mse, trimmed };
     if let Some(rel_mse) = estimated {
         board.history.estimated.push(point(rel_mse, None));
@@ -201,19 +201,19 @@ mod tests {
     use super::*;
 
     /// Of the first iterations, and the first of them painted.
-    fn frames() -> ([Arc<Frame>; 3], Arc<Painted>) {
+    fn snapshots() -> ([Arc<Snapshot>; 3], Arc<Painted>) {
         let mut session = session(Interrupt::default());
-        let frames = std::array::from_fn(|_| {
+        let snapshots = std::array::from_fn(|_| {
             session.iterate().unwrap();
-            Arc::new(session.frame().unwrap())
+            Arc::new(session.snapshot().unwrap())
         });
-        let painted = Painter::default().paint(&frames[0], None, Painting::default());
-        (frames, Arc::new(painted))
+        let painted = Painter::default().paint(&snapshots[0], None, Painting::default());
+        (snapshots, Arc::new(painted))
     }
 
-    fn board(frame: &Arc<Frame>, painted: &Arc<Painted>) -> Board {
+    fn board(snapshot: &Arc<Snapshot>, painted: &Arc<Painted>) -> Board {
         Board {
-            frame: Some(Arc::clone(frame)),
+            snapshot: Some(Arc::clone(snapshot)),
             painted: Some(Arc::clone(painted)),
             phase: Phase::Rendering,
             ..Board::default()
@@ -222,7 +222,7 @@ mod tests {
 
     #[test]
     fn a_newer_film_waits_and_what_is_asked_for_does_not() {
-        let ([first, second, third], painted) = frames();
+        let ([first, second, third], painted) = snapshots();
         let mut state = State { rested: Some(Instant::now() + Duration::from_secs(3600)), ..State::default() };
         let mut paints = |board: &Board| matches!(state.next(board), Ok(Next::Paint(_)));
         assert!(!paints(&board(&first, &painted)));
@@ -236,9 +236,9 @@ mod tests {
         asked = board(&second, &painted);
         asked.phase = Phase::Paused;
         assert!(paints(&asked));
-        let restarted = Frame { estimate: 2, ..Frame::clone(&third) };
+        let restarted = Snapshot { estimate: 2, ..Snapshot::clone(&third) };
         assert!(paints(&board(&Arc::new(restarted), &painted)));
-        let looked_into = Frame { insides: Some(Arc::default()), ..Frame::clone(&third) };
+        let looked_into = Snapshot { insides: Some(Arc::default()), ..Snapshot::clone(&third) };
         assert!(paints(&board(&Arc::new(looked_into), &painted)));
         state.rested = Some(Instant::now());
         assert!(matches!(state.next(&board(&second, &painted)), Ok(Next::Paint(_))));
@@ -246,33 +246,33 @@ mod tests {
 
     #[test]
     fn what_was_painted_is_dropped_by_who_painted_it() {
-        let ([first, second, _], shown) = frames();
+        let ([first, second, _], shown) = snapshots();
         let mut state = State { painted: vec![Arc::clone(&shown)], ..State::default() };
         let mut board = board(&first, &shown);
         assert!(matches!(state.next(&board), Err(None)));
         // The window still shows it, and does not say when it no longer does.
         let newer = Arc::new(Painter::default().paint(&second, None, Painting::default()));
-        (board.frame, board.painted) = (Some(second), Some(Arc::clone(&newer)));
+        (board.snapshot, board.painted) = (Some(second), Some(Arc::clone(&newer)));
         state.painted.push(newer);
         assert!(matches!(state.next(&board), Err(Some(_))));
         drop(shown);
         assert!(matches!(state.next(&board), Ok(Next::Drop(left)) if left.len() == 1));
         assert!(matches!(state.next(&board), Err(None)));
         // Of a scene that is left, too.
-        (board.frame, board.painted) = (None, None);
+        (board.snapshot, board.painted) = (None, None);
         assert!(matches!(state.next(&board), Ok(Next::Drop(left)) if left.len() == 1));
         assert!(matches!(state.next(&board), Err(None)));
     }
 
     #[test]
     fn a_reference_is_made_again_only_to_be_shown_otherwise() {
-        let ([first, second, _], _) = frames();
+        let ([first, second, _], _) = snapshots();
         let reference = Arc::new(Reference { name: String::new(), picture: first.picture() });
         let mut painter = Painter::default();
         let mut painting = Painting::default();
         painting.look.exposure = Some(0.0);
-        let mut image_of = |frame, painting| {
-            let painted = painter.paint(frame, Some(Arc::clone(&reference)), painting);
+        let mut image_of = |snapshot, painting| {
+            let painted = painter.paint(snapshot, Some(Arc::clone(&reference)), painting);
             painted.reference.unwrap().1
         };
         let image = image_of(&first, painting);
@@ -290,7 +290,7 @@ mod tests {
 
     #[test]
     fn a_difference_ends_where_it_is_told_to() {
-        let ([first, second, _], _) = frames();
+        let ([first, second, _], _) = snapshots();
         let mut picture = first.picture();
         let n = picture.rgb.len();
         picture.rgb[..n / 4].fill([1e30; 3]);
@@ -318,11 +318,11 @@ mod tests {
     /// In the window alone, and wherever it shows the picture or the reference.
     #[test]
     fn what_is_not_finite_is_marked() {
-        let ([first, ..], _) = frames();
+        let ([first, ..], _) = snapshots();
         let mut film = first.film.as_ref().clone();
         film.pixels[3][0] = f32::INFINITY;
         film.pixels[4][2] = f32::NAN;
-        let frame = Arc::new(Frame { film: Arc::new(film), ..Frame::clone(&first) });
+        let snapshot = Arc::new(Snapshot { film: Arc::new(film), ..Snapshot::clone(&first) });
         let mut picture = first.picture();
         picture.rgb[5] = [f32::NEG_INFINITY, 0.0, 0.0];
         let reference = Arc::new(Reference { name: String::new(), picture });
@@ -332,24 +332,24 @@ mod tests {
         // Those of a kind of light are the picture until an iteration is looked into.
         for view in [View::Picture, View::Stops, View::Direct] {
             let painting = Painting { view, comparison: Comparison::Wipe, ..Painting::default() };
-            let painted = Painter::default().paint(&frame, Some(Arc::clone(&reference)), painting);
+            let painted = Painter::default().paint(&snapshot, Some(Arc::clone(&reference)), painting);
             assert_eq!(marked(&painted.image), [3, 4], "{view:?}");
             assert_eq!(marked(&painted.reference.as_ref().unwrap().1), [5], "{view:?}");
         }
         for comparison in Measure::ALL.map(Comparison::Difference).into_iter().chain([Comparison::Flip]) {
             let painting = Painting { comparison, ..Painting::default() };
-            let painted = Painter::default().paint(&frame, Some(Arc::clone(&reference)), painting);
+            let painted = Painter::default().paint(&snapshot, Some(Arc::clone(&reference)), painting);
             assert_eq!(marked(&painted.image), [3, 4, 5], "{comparison:?}");
         }
         // Not what is written.
         let mut bytes = vec![];
-        display::rgb8(&frame.picture(), 0.0, ToneMap::Srgb, &mut bytes);
+        display::rgb8(&snapshot.picture(), 0.0, ToneMap::Srgb, &mut bytes);
         assert!(bytes.chunks_exact(3).all(|rgb| rgb != &NOT_FINITE[..3]));
     }
 
     #[test]
     fn a_view_behind_a_difference_needs_nothing() {
-        let ([first, second, _], painted) = frames();
+        let ([first, second, _], painted) = snapshots();
         let reference = Arc::new(Reference { name: String::new(), picture: first.picture() });
         let mut board = board(&second, &painted);
         let painting = Painting {

@@ -11,7 +11,7 @@ use sunfleck::output;
 use sunfleck::output::display::Look;
 use sunfleck::scene::settings::Settings;
 
-use super::{Board, Choice, Frame, Message, Phase, Shared, catch};
+use super::{Board, Choice, Message, Phase, Shared, Snapshot, catch};
 use crate::{job, progress};
 
 /// What to write, and where.
@@ -27,40 +27,40 @@ pub struct Save {
 
 impl Save {
     /// What is to be written, or why nothing is; none as long as that is to be seen.
-    pub(super) fn ready(&self, board: &Board) -> Option<Result<Arc<Frame>, &'static str>> {
+    pub(super) fn ready(&self, board: &Board) -> Option<Result<Arc<Snapshot>, &'static str>> {
         if self.scene != board.wanted.scene {
             return Some(Err("its scene was left before there was a picture of it"));
         }
         // What is read again may be another picture.
-        let is_of = |frame: &&Arc<Frame>| Some(&frame.opened.choice) == self.scene.as_ref();
-        let frame = board.frame.as_ref().filter(is_of).filter(|_| board.phase != Phase::Loading || board.quit);
+        let is_of = |snapshot: &&Arc<Snapshot>| Some(&snapshot.opened.choice) == self.scene.as_ref();
+        let snapshot = board.snapshot.as_ref().filter(is_of).filter(|_| board.phase != Phase::Loading || board.quit);
         let has_failed = matches!(board.phase, Phase::Failed(_));
-        match frame.filter(|frame| !frame.is_preview || has_failed) {
-            Some(frame) => Some(Ok(Arc::clone(frame))),
+        match snapshot.filter(|snapshot| !snapshot.is_preview || has_failed) {
+            Some(snapshot) => Some(Ok(Arc::clone(snapshot))),
             None if has_failed || board.quit || self.scene.is_none() => Some(Err("there is no picture yet")),
             None => None,
         }
     }
 
     /// Writes a film. Returns the number of its iterations.
-    pub fn write(&self, frame: &Frame) -> Result<u32> {
-        let (film, machine) = (&frame.film, &frame.machine);
-        frame.opened.source.check_not_read(&self.settings, &self.path)?;
-        let picture = frame.picture();
+    pub fn write(&self, snapshot: &Snapshot) -> Result<u32> {
+        let (film, machine) = (&snapshot.film, &snapshot.machine);
+        snapshot.opened.source.check_not_read(&self.settings, &self.path)?;
+        let picture = snapshot.picture();
         if job::is_png(&self.path) {
             output::png::write(&self.path, &picture, &Look::of(&self.settings))?;
         } else {
-            let (opened, flags) = (&frame.opened, &machine.flags);
+            let (opened, flags) = (&snapshot.opened, &machine.flags);
             let name = &opened.source.name;
             let header = output::exr::Header {
                 scene: name.clone(),
-                command: opened.command(name, &frame.settings, flags, film.n_iterations, &self.path),
+                command: opened.command(name, &snapshot.settings, flags, film.n_iterations, &self.path),
                 adapter: machine.device.clone(),
                 index: machine.index.clone(),
-                accelerator: frame.scene.accelerator().to_string(),
-                seconds: frame.seconds,
-                camera: frame.camera,
-                ..output::exr::Header::of(&frame.params, frame.first_radius, film.n_iterations)
+                accelerator: snapshot.scene.accelerator().to_string(),
+                seconds: snapshot.seconds,
+                camera: snapshot.camera,
+                ..output::exr::Header::of(&snapshot.params, snapshot.first_radius, film.n_iterations)
             };
             output::exr::write(&self.path, &picture, &header)?;
         }
@@ -75,14 +75,14 @@ pub fn run(shared: &Shared) {
         saves.find_map(|(i, save)| Some((i, save.ready(board)?)))
     };
     loop {
-        let (save, frame) = {
+        let (save, snapshot) = {
             let mut board = shared.wait_until(|board| next(board).is_some());
-            let Some((i, frame)) = next(&board) else { break };
-            (board.saves.remove(i), frame)
+            let Some((i, snapshot)) = next(&board) else { break };
+            (board.saves.remove(i), snapshot)
         };
         let path = save.path.display();
-        let done = match frame {
-            Ok(frame) => catch(|| save.write(&frame).map_err(|error| crate::one_line(&crate::chain(&error)))),
+        let done = match snapshot {
+            Ok(snapshot) => catch(|| save.write(&snapshot).map_err(|error| crate::one_line(&crate::chain(&error)))),
             Err(why) => Ok(Err(format!("{path} was not written: {why}"))),
         };
         let message = match done.flatten() {

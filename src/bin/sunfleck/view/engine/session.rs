@@ -30,7 +30,7 @@ const SHOW_FIRST: u32 = 3;
 
 /// A film, and what made it.
 #[derive(Clone, Debug)]
-pub struct Frame {
+pub struct Snapshot {
     /// Changes with every restart.
     pub estimate: u64,
     pub film: Arc<Film>,
@@ -68,7 +68,7 @@ pub struct Machine {
     pub index: String,
 }
 
-impl Frame {
+impl Snapshot {
     /// The film as a picture.
     pub fn picture(&self) -> Picture {
         Picture { size: self.params.size, crop: self.params.crop, rgb: self.film.rgb(), variance: None }
@@ -269,32 +269,32 @@ impl Session {
     }
 
     /// The film, if it is time to show it, or if there will be no more; with as much of the iteration as `needs` says.
-    pub fn frame_if_due(&mut self, is_last: bool, needs: Needs) -> Result<Option<Frame>, Error> {
+    pub fn snapshot_if_due(&mut self, is_last: bool, needs: Needs) -> Result<Option<Snapshot>, Error> {
         let is_awaited = |s: &Shown| !needs.are_met_by(s.has) || s.is_over();
         let is_due = is_last || self.n_iterations <= SHOW_FIRST || self.shown.as_ref().is_none_or(is_awaited);
         if !is_due || !self.owes(needs) {
             return Ok(None);
         }
         let began = Instant::now();
-        let mut frame = self.frame()?;
+        let mut snapshot = self.snapshot()?;
         let film = began.elapsed();
         if needs.is_any() && self.is_whole {
-            frame.insides = Some(Arc::new(self.insides(needs)?));
+            snapshot.insides = Some(Arc::new(self.insides(needs)?));
         }
         self.shown = Some(Shown {
             when: Instant::now(),
             took: [film, began.elapsed() - film],
-            is_taken: Arc::clone(&frame.is_taken),
+            is_taken: Arc::clone(&snapshot.is_taken),
             n_iterations: self.n_iterations,
-            has: frame.has(),
+            has: snapshot.has(),
         });
-        Ok(Some(frame))
+        Ok(Some(snapshot))
     }
 
     /// The film as it is.
-    pub fn frame(&mut self) -> Result<Frame, Error> {
+    pub fn snapshot(&mut self) -> Result<Snapshot, Error> {
         let scale = ppm::RadiusSchedule::new(self.params.alpha).scale(self.n_iterations.max(1));
-        Ok(Frame {
+        Ok(Snapshot {
             estimate: self.estimate,
             film: Arc::new(self.stages.film()?),
             is_preview: self.is_preview,
@@ -373,11 +373,11 @@ pub mod tests {
     #[test]
     fn a_film_is_read_back_when_the_last_is_taken_and_that_leaves_time_to_render() {
         let mut session = session(Interrupt::default());
-        let mut frame = None;
+        let mut snapshot = None;
         for _ in 0..SHOW_FIRST {
             session.iterate().unwrap();
-            frame = session.frame_if_due(false, NOTHING).unwrap();
-            assert!(frame.is_some());
+            snapshot = session.snapshot_if_due(false, NOTHING).unwrap();
+            assert!(snapshot.is_some());
         }
         session.iterate().unwrap();
         let long_ago = |session: &mut Session, film: u64, insides: u64| {
@@ -386,21 +386,21 @@ pub mod tests {
             shown.took = [film, insides].map(Duration::from_millis);
         };
         long_ago(&mut session, 1, 0);
-        assert!(session.frame_if_due(false, NOTHING).unwrap().is_none());
-        frame.unwrap().is_taken.store(true, Ordering::Relaxed);
+        assert!(session.snapshot_if_due(false, NOTHING).unwrap().is_none());
+        snapshot.unwrap().is_taken.store(true, Ordering::Relaxed);
         for (film, insides) in [(20_000, 0), (1, 200_000)] {
             long_ago(&mut session, film, insides);
-            assert!(session.frame_if_due(false, NOTHING).unwrap().is_none());
+            assert!(session.snapshot_if_due(false, NOTHING).unwrap().is_none());
         }
         long_ago(&mut session, 50, 500);
-        assert!(session.frame_if_due(false, NOTHING).unwrap().is_some());
+        assert!(session.snapshot_if_due(false, NOTHING).unwrap().is_some());
         // What was asked for since is shown at once, and the last in any case.
         session.iterate().unwrap();
-        assert!(session.frame_if_due(false, NOTHING).unwrap().is_none());
-        assert!(session.frame_if_due(false, PHOTONS).unwrap().is_some());
+        assert!(session.snapshot_if_due(false, NOTHING).unwrap().is_none());
+        assert!(session.snapshot_if_due(false, PHOTONS).unwrap().is_some());
         session.iterate().unwrap();
-        assert!(session.frame_if_due(false, PHOTONS).unwrap().is_none());
-        assert!(session.frame_if_due(true, PHOTONS).unwrap().is_some());
+        assert!(session.snapshot_if_due(false, PHOTONS).unwrap().is_none());
+        assert!(session.snapshot_if_due(true, PHOTONS).unwrap().is_some());
     }
 
     #[test]
@@ -411,15 +411,15 @@ pub mod tests {
         session.iterate().unwrap();
         for needs in [NOTHING, PHOTONS, SPLIT, NODES] {
             assert!(session.owes(needs), "{needs:?}");
-            let has = session.frame_if_due(true, needs).unwrap().unwrap().has();
+            let has = session.snapshot_if_due(true, needs).unwrap().unwrap().has();
             assert_eq!(has, Needs { photons: needs.is_any(), ..needs });
             assert!(!session.owes(needs) && !session.owes(NOTHING), "{needs:?}");
         }
         assert_eq!(session.split.n_iterations, 1);
         // What gathers again can be left.
         is_unwanted.store(true, Ordering::Relaxed);
-        assert!(matches!(session.frame_if_due(true, SPLIT), Err(Error::Interrupted)));
-        assert!(session.frame_if_due(true, PHOTONS).unwrap().is_none());
+        assert!(matches!(session.snapshot_if_due(true, SPLIT), Err(Error::Interrupted)));
+        assert!(session.snapshot_if_due(true, PHOTONS).unwrap().is_none());
         assert_eq!(session.split.n_iterations, 1);
     }
 }

@@ -118,7 +118,7 @@ impl Bench {
 }
 
 fn iterations(now: &Now) -> Option<u32> {
-    now.frame.as_ref().map(|frame| frame.film.n_iterations)
+    now.snapshot.as_ref().map(|snapshot| snapshot.film.n_iterations)
 }
 
 fn until(n: u32) -> Limits {
@@ -159,21 +159,21 @@ fn a_saved_picture_is_that_of_render_bit_for_bit() {
     };
     bench.wanted.moving = true;
     bench.set(moved);
-    bench.wait("a preview", |now| now.frame.as_ref().is_some_and(|f| f.is_preview && f.params.size == [8, 8]));
+    bench.wait("a preview", |now| now.snapshot.as_ref().is_some_and(|f| f.is_preview && f.params.size == [8, 8]));
     bench.wanted.moving = false;
     bench.send();
     let second = bench.wait("the picture", |now| {
-        now.phase == Phase::Reached && now.frame.as_ref().is_some_and(|f| !f.is_preview && f.film.n_iterations == 5)
+        now.phase == Phase::Reached && now.snapshot.as_ref().is_some_and(|f| !f.is_preview && f.film.n_iterations == 5)
     });
     let settings = bench.wanted.settings.as_deref().unwrap().clone();
     let film = rendered(&settings, 5);
-    assert_eq!(*second.frame.as_ref().unwrap().film, film);
+    assert_eq!(*second.snapshot.as_ref().unwrap().film, film);
     bench.wanted.restarts += 1;
     bench.send();
     let again = bench.wait("the restart", |now| {
         now.phase == Phase::Reached && iterations(now) == Some(5) && now.estimate > second.estimate
     });
-    assert_eq!(*again.frame.unwrap().film, film);
+    assert_eq!(*again.snapshot.unwrap().film, film);
     assert!(matches!(bench.save(&path), Message::Said(_)));
     assert_eq!(exr::read(&path).unwrap().rgb, film.rgb());
     let nowhere = folder.path().join("none/a.exr");
@@ -185,11 +185,11 @@ fn a_picture_is_saved_while_the_render_thread_is_busy() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
     let mut bench = Bench::open("cornell", Limits::default());
-    bench.wait("a picture", |now| now.frame.is_some());
+    bench.wait("a picture", |now| now.snapshot.is_some());
     let gate = Arc::clone(&bench.gate);
     let held = gate.held.lock().unwrap();
     bench.wait("the gate", |_| gate.is_reached.load(Ordering::Relaxed));
-    let shown = bench.engine.now().frame.unwrap();
+    let shown = bench.engine.now().snapshot.unwrap();
     assert!(matches!(bench.save(&path), Message::Said(_)));
     assert_eq!(exr::read(&path).unwrap().rgb, shown.film.rgb());
     // A scene that has been left is not saved, and of the next one not before there is something.
@@ -214,7 +214,7 @@ fn a_preview_is_not_saved_for_the_picture() {
     bench.wanted.moving = true;
     bench.wait_for_film(&Phase::Reached, 2);
     bench.send();
-    bench.wait("a preview", |now| now.frame.as_ref().is_some_and(|frame| frame.is_preview));
+    bench.wait("a preview", |now| now.snapshot.as_ref().is_some_and(|snapshot| snapshot.is_preview));
     let scene = bench.wanted.scene.clone();
     bench.engine.save(Save { path: path.clone(), settings: Arc::default(), scene });
     bench.wanted.moving = false;
@@ -252,8 +252,8 @@ fn pauses_steps_and_limits_count_exactly() {
     let noise = bench.engine.history(|h| h.estimated.last().copied()).unwrap();
     assert!(noise.iteration <= iterations(&now).unwrap() && noise.rel_mse > 0.0);
     // Nothing goes on, nobody is woken.
-    bench.wait("the last picture", |now| match (&now.painted, &now.frame) {
-        (Some(painted), Some(frame)) => now.phase == Phase::Reached && Arc::ptr_eq(&painted.frame, frame),
+    bench.wait("the last picture", |now| match (&now.painted, &now.snapshot) {
+        (Some(painted), Some(snapshot)) => now.phase == Phase::Reached && Arc::ptr_eq(&painted.snapshot, snapshot),
         _ => false,
     });
     std::thread::sleep(Duration::from_millis(100));
@@ -286,7 +286,7 @@ fn a_long_stage_is_left_at_once() {
     let before = lengthen(&mut bench);
     bench.wanted.moving = true;
     bench.send();
-    bench.wait("a preview", |now| now.frame.as_ref().is_some_and(|frame| frame.is_preview));
+    bench.wait("a preview", |now| now.snapshot.as_ref().is_some_and(|snapshot| snapshot.is_preview));
     is_left_early(before, "moving");
     bench.wanted.moving = false;
     let before = asks();
@@ -341,12 +341,12 @@ fn what_fails_can_be_put_right() {
     assert!(matches!(bench.save(&folder.path().join("a.exr")), Message::Said(_)));
     bench.set(|settings| settings.camera = None);
     let again = bench.wait("the picture", |now| now.phase == Phase::Reached && now.estimate > good.estimate);
-    assert_eq!(again.frame.unwrap().film, good.frame.unwrap().film);
+    assert_eq!(again.snapshot.unwrap().film, good.snapshot.unwrap().film);
     // A scene that is not there, and back.
     bench.wanted.settings = None;
     bench.choose("no/such.glb", &[]);
     let now = bench.wait("the error", |now| matches!(&now.phase, Phase::Failed(text) if text.contains("such.glb")));
-    assert!(now.opened.is_none() && now.frame.is_none());
+    assert!(now.opened.is_none() && now.snapshot.is_none());
     bench.wanted.scene = None;
     bench.send();
     bench.wait_for(&Phase::Empty);
@@ -361,9 +361,10 @@ fn a_scene_that_is_left_is_freed() {
         bench.choose(name, &["size=16x16", "photons=500", &format!("seed={i}")]);
         let now = bench.wait(name, |now| {
             let same = now.opened.as_ref().is_some_and(|opened| opened.source.settings.seed == Some(i as u32));
-            same && now.phase == Phase::Reached && now.painted.as_ref().is_some_and(|p| p.frame.film.n_iterations == 1)
+            same && now.phase == Phase::Reached
+                && now.painted.as_ref().is_some_and(|p| p.snapshot.film.n_iterations == 1)
         });
-        left.push(Arc::downgrade(&now.frame.unwrap().scene));
+        left.push(Arc::downgrade(&now.snapshot.unwrap().scene));
     }
     bench.wanted.scene = None;
     bench.send();
@@ -387,7 +388,7 @@ fn the_focus_restarts_what_it_changes() {
     camera.aperture_radius = 0.1;
     bench.set(|settings| settings.camera = Some(CameraSettings::from(&camera)));
     let open = bench.wait("a lens", |now| now.estimate > before.estimate && now.phase == Phase::Reached);
-    assert_eq!(open.frame.as_ref().unwrap().camera.focus_distance, camera.focus_distance);
+    assert_eq!(open.snapshot.as_ref().unwrap().camera.focus_distance, camera.focus_distance);
     camera.focus_distance *= 2.0;
     bench.set(|settings| settings.camera = Some(CameraSettings::from(&camera)));
     bench.wait("another focus", |now| now.estimate > open.estimate);
@@ -414,7 +415,7 @@ fn a_lost_device_is_opened_again() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
     assert!(matches!(bench.save(&path), Message::Said(_)));
-    assert_eq!(exr::read(&path).unwrap().rgb, before.frame.unwrap().film.rgb());
+    assert_eq!(exr::read(&path).unwrap().rgb, before.snapshot.unwrap().film.rgb());
     bench.wanted.retries += 1;
     bench.send();
     bench.wait_for_film(&Phase::Reached, 4);
@@ -428,11 +429,11 @@ fn searched_in_both_ways(device: Device, other: &str) -> [Film; 2] {
     let after = bench.wait("another estimate", |now| {
         now.estimate > before.estimate && now.phase == Phase::Reached && iterations(now) == Some(2)
     });
-    let frame = after.frame.unwrap();
+    let snapshot = after.snapshot.unwrap();
     let command =
-        frame.opened.command(&frame.opened.source.name, &frame.settings, "--backend x", 2, Path::new("a.exr"));
+        snapshot.opened.command(&snapshot.opened.source.name, &snapshot.settings, "--backend x", 2, Path::new("a.exr"));
     assert!(command.contains(" --backend x ") && command.contains(&format!(" --set {other} ")), "{command}");
-    [before.frame.unwrap(), frame].map(|frame| frame.film.as_ref().clone())
+    [before.snapshot.unwrap(), snapshot].map(|snapshot| snapshot.film.as_ref().clone())
 }
 
 #[test]
@@ -453,7 +454,7 @@ fn a_file_of_another_machine_is_searched_by_the_default() {
         std::fs::write(&path, "scene = \"cornell\"\naccel = \"kd\"\nindex = \"hardware\"\n").unwrap();
         let mut bench = Bench::open_on(device, &path.to_string_lossy(), until(2));
         let now = bench.wait_for_film(&Phase::Reached, 2);
-        let accelerator = now.frame.unwrap().scene.accelerator();
+        let accelerator = now.snapshot.unwrap().scene.accelerator();
         assert_eq!(accelerator, if is_cpu { Accelerator::Kd } else { Accelerator::Bvh });
         // Said once, whatever else is changed.
         bench.set(|settings| settings.light_scale = Some(2.0));
@@ -469,7 +470,7 @@ fn a_file_of_another_machine_is_searched_by_the_default() {
         let next = bench.wait("another scene", |now| {
             now.opened.as_ref().is_some_and(|opened| opened.source.name == "cornell") && now.phase == Phase::Reached
         });
-        assert_eq!(next.frame.unwrap().scene.accelerator(), Accelerator::Bvh);
+        assert_eq!(next.snapshot.unwrap().scene.accelerator(), Accelerator::Bvh);
         assert!(bench.engine.take_messages().is_empty());
     }
 }
@@ -506,11 +507,11 @@ fn what_scenes_share_is_freed_with_the_last() {
     let now = bench.wait_for_film(&Phase::Reached, 2);
     let scene = &now.opened.as_ref().unwrap().loaded.scene;
     let (mesh, before) = (Arc::downgrade(&scene.meshes[0]), now.estimate);
-    let first = Arc::downgrade(&now.frame.as_ref().unwrap().scene.nodes);
+    let first = Arc::downgrade(&now.snapshot.as_ref().unwrap().scene.nodes);
     bench.set(|settings| settings.material_mut(scene, 0).emission = Some([1.0; 3]));
     drop(now);
     let now = bench.wait("the change", |now| now.phase == Phase::Reached && now.estimate > before);
-    let second = Arc::downgrade(&now.frame.as_ref().unwrap().scene.primitives);
+    let second = Arc::downgrade(&now.snapshot.as_ref().unwrap().scene.primitives);
     drop(now);
     bench.wanted.scene = None;
     bench.send();

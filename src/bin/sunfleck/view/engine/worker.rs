@@ -119,7 +119,7 @@ impl Have {
             // Freed here, and not while others wait for the board.
             drop(shared.update(|board| {
                 board.phase = if wanted.scene.is_some() { Phase::Loading } else { Phase::Empty };
-                (!stays).then(|| (board.opened.take(), board.frame.take(), board.painted.take()))
+                (!stays).then(|| (board.opened.take(), board.snapshot.take(), board.painted.take()))
             }));
             let Some(choice) = wanted.scene.clone() else { return Ok(()) };
             let is_left = |board: &Board| is_other_scene(wanted, &board.wanted);
@@ -140,7 +140,7 @@ impl Have {
             drop(shared.update(|board| {
                 board.messages.extend(device.cannot(&opened.source).into_iter().map(Message::Warning));
                 board.wanted.settings.clone_from(&wanted.settings);
-                (board.opened.replace(opened), board.frame.take(), board.painted.take())
+                (board.opened.replace(opened), board.snapshot.take(), board.painted.take())
             }));
             return self.prepare(shared, device, &wanted);
         }
@@ -278,17 +278,17 @@ impl Have {
             let keep_on = wanted.moving && session.n_iterations == 1;
             shared.redirect(|board| board.work = Some(Work { wanted, opened, keep_on }));
         }
-        let frame = session.frame_if_due(is_last, needs);
+        let snapshot = session.snapshot_if_due(is_last, needs);
         if is_long {
             shared.redirect(|board| board.work = None);
         }
-        let frame = match frame {
+        let snapshot = match snapshot {
             Err(Error::Interrupted) => return Ok(()),
-            frame => frame?,
+            snapshot => snapshot?,
         };
-        if let Some(frame) = frame {
+        if let Some(snapshot) = snapshot {
             // What nobody has taken is freed here, and not while others wait for the board.
-            drop(shared.update(|board| board.frame.replace(Arc::new(frame))));
+            drop(shared.update(|board| board.snapshot.replace(Arc::new(snapshot))));
         }
         if is_last {
             shared.enter(resting(wanted));
@@ -397,7 +397,7 @@ mod tests {
         let (mut have, mut device) = (Have::default(), Device::Cpu(Accelerator::Bvh));
         shared.board().wanted = resting.clone();
         have.follow(&shared, &mut device, &moving).unwrap();
-        let is_preview = || shared.board().frame.as_ref().map(|frame| frame.is_preview);
+        let is_preview = || shared.board().snapshot.as_ref().map(|snapshot| snapshot.is_preview);
         assert_eq!(is_preview(), Some(true));
         assert!(have.is_behind(&resting));
         for _ in 0..2 {

@@ -157,7 +157,7 @@ fn radius(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, now: &Settings) {
     });
     if changed {
         // Begins with what the automatic ones are like.
-        let automatic = viewer.now.frame.as_ref().map(|frame| frame.first_radius).filter(|r| *r > 0.0);
+        let automatic = viewer.now.snapshot.as_ref().map(|snapshot| snapshot.first_radius).filter(|r| *r > 0.0);
         fixed = is_fixed.then(|| short(automatic.unwrap_or(0.01)));
     }
     let size = viewer.scene_size();

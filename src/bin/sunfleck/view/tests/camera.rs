@@ -97,7 +97,7 @@ fn the_picture_follows_the_cursor() {
         window.steps(2);
         let painted = Arc::clone(window.viewer().picture.painted().unwrap());
         let film = (at - shown.min) * painted.size[1] as f32 / shown.height();
-        let hit = inspect::pick(&painted.frame.scene, &painted.frame.view(), glam::vec2(film.x, film.y)).unwrap();
+        let hit = inspect::pick(&painted.snapshot.scene, &painted.snapshot.view(), glam::vec2(film.x, film.y)).unwrap();
         let distance = |window: &mut Window| window.viewer().rig().unwrap().position().distance(hit.position);
         let from = distance(&mut window);
         let wheel = Event::MouseWheel {

@@ -16,7 +16,7 @@ use crate::view::engine::{Comparison, Painted, Reference, View};
 
 /// Compares the picture by FLIP with itself after `change`.
 fn compared(window: &mut Window, change: impl FnOnce(&mut Picture)) -> Arc<Painted> {
-    let mut picture = window.viewer().now.frame.as_ref().unwrap().picture();
+    let mut picture = window.viewer().now.snapshot.as_ref().unwrap().picture();
     change(&mut picture);
     let reference = Arc::new(Reference { name: "changed.exr".into(), picture });
     window.viewer().engine().set_reference(Some(Arc::clone(&reference)));
@@ -129,7 +129,8 @@ fn the_camera_turns_on_the_line_as_beside_it() {
             window.step();
         }
         if button != PointerButton::Primary {
-            window.wait("preview", |viewer| viewer.picture.painted().is_some_and(|painted| painted.frame.is_preview));
+            window
+                .wait("preview", |viewer| viewer.picture.painted().is_some_and(|painted| painted.snapshot.is_preview));
         }
         let way = window.viewer().edits.now().camera.clone();
         window.step();
@@ -206,8 +207,15 @@ fn what_is_left_is_freed() {
         drop(compared(&mut window, |_| {}));
         wipe(&mut window);
         let painted = window.viewer().picture.painted().unwrap().clone();
-        let frame = &painted.frame;
-        let kept = [of(&painted), of(frame), of(&frame.film), of(&frame.scene), of(&frame.opened), of(&painted.image)];
+        let snapshot = &painted.snapshot;
+        let kept = [
+            of(&painted),
+            of(snapshot),
+            of(&snapshot.film),
+            of(&snapshot.scene),
+            of(&snapshot.opened),
+            of(&painted.image),
+        ];
         drop(painted);
         // A panel that is not drawn keeps nothing either.
         window.viewer().remembered.show_inspect = false;

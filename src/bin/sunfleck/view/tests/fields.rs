@@ -307,9 +307,9 @@ fn any_material_can_be_made_to_shine() {
     enter(&mut window, "Emission ×", 0, "2");
     assert_eq!(window.viewer().edits.now().materials[0].emission_strength, Some(2.0));
     window.wait_for_picture();
-    let frame = window.viewer().now.frame.clone().unwrap();
+    let snapshot = window.viewer().now.snapshot.clone().unwrap();
     let green = |rgb: &[f32; 3]| rgb[1] > 5.0 * rgb[0].max(rgb[2]);
-    assert!(frame.picture().rgb.iter().filter(|rgb| green(rgb)).count() > 32);
+    assert!(snapshot.picture().rgb.iter().filter(|rgb| green(rgb)).count() > 32);
     for name in ["Reset emission ×", "Reset emission"] {
         window.activate(name);
     }

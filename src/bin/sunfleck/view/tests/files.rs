@@ -107,10 +107,14 @@ fn an_environment_lights_the_scene_that_is_open() {
     window.wait_for_picture();
     let mean = |window: &mut Window| {
         window.wait("picture in this light", |viewer| {
-            viewer.now.frame.as_ref().is_some_and(|frame| frame.settings.environment == viewer.edits.now().environment)
+            viewer
+                .now
+                .snapshot
+                .as_ref()
+                .is_some_and(|snapshot| snapshot.settings.environment == viewer.edits.now().environment)
         });
         window.wait_for_picture();
-        let picture = window.viewer().now.frame.as_ref().unwrap().picture();
+        let picture = window.viewer().now.snapshot.as_ref().unwrap().picture();
         picture.rgb.iter().map(|rgb| rgb[0]).sum::<f32>() / picture.rgb.len() as f32
     };
     let before = mean(&mut window);

@@ -44,11 +44,11 @@ fn what_was_said_of_a_scene_is_not_said_again() {
     window.wait_for_picture();
     window.steps(400);
     assert!(!window.shows("a soft sky is added"));
-    let estimate = window.viewer().picture.painted().unwrap().frame.estimate;
+    let estimate = window.viewer().picture.painted().unwrap().snapshot.estimate;
     window.viewer().edit_at(0.0, "light scale", |s| s.light_scale = Some(2.0));
     window.wait("picture", move |viewer| {
         assert!(viewer.messages.texts().all(|text| !text.contains("sky")));
-        viewer.picture.painted().is_some_and(|painted| painted.frame.estimate > estimate)
+        viewer.picture.painted().is_some_and(|painted| painted.snapshot.estimate > estimate)
     });
 }
 
@@ -215,7 +215,7 @@ fn what_is_changed_by_hand_outlives_a_file_that_is_read_again() {
     window.wait_for_picture();
     let now = window.viewer().edits.now().clone();
     assert_eq!((now.alpha, now.photons, now.seed, now.exposure), (Some(0.8), Some(Count(300)), Some(5), Some(1.5)));
-    assert_eq!(window.viewer().now.frame.as_ref().unwrap().params.n_paths, 300);
+    assert_eq!(window.viewer().now.snapshot.as_ref().unwrap().params.n_paths, 300);
     // The steps that led there can still be undone.
     for expected in [Some(0.7), Some(0.8)] {
         window.press(Modifiers::COMMAND, Key::Z);
@@ -249,7 +249,7 @@ fn a_file_says_when_its_scene_stops() {
     std::thread::sleep(Duration::from_millis(300));
     window.wait("limit", |viewer| viewer.now.phase == Phase::Reached);
     assert_eq!(window.viewer().wanted.limits, Limits { iterations: Some(2), ..flags });
-    assert_eq!(window.viewer().now.frame.as_ref().unwrap().film.n_iterations, 2);
+    assert_eq!(window.viewer().now.snapshot.as_ref().unwrap().film.n_iterations, 2);
     let text = window.viewer().settings_text("a.toml".as_ref()).unwrap();
     assert!(text.contains("iterations = 2\n") && text.contains("seconds = 0.05\n"), "{text}");
     assert_eq!(open(&mut window, &bare, &[]), flags);
@@ -539,7 +539,7 @@ fn a_change_shows_a_preview_first_where_iterations_are_slow() {
         window.press(modifiers, key);
         assert!(window.viewer().wanted.moving, "{key:?}");
         window.wait("preview", |viewer| {
-            viewer.picture.painted().is_some_and(|p| p.frame.is_preview && p.frame.estimate > estimate)
+            viewer.picture.painted().is_some_and(|p| p.snapshot.is_preview && p.snapshot.estimate > estimate)
         });
         window.wait_for_picture();
     }

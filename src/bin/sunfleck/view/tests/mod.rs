@@ -105,15 +105,16 @@ impl Window {
         self.wait("finished picture", |viewer| {
             let stands = |camera: &Camera| (camera.position, camera.forward, camera.up);
             let camera = viewer.camera().map(|camera| camera.pack(1, 1));
-            let n = |frame: &super::engine::Frame| !frame.is_preview && frame.film.n_iterations == ITERATIONS;
+            let n =
+                |snapshot: &super::engine::Snapshot| !snapshot.is_preview && snapshot.film.n_iterations == ITERATIONS;
             viewer.now.phase == Phase::Reached
                 && !viewer.wanted.moving
                 && viewer.picture.painted().is_some_and(|painted| {
-                    let frame = &painted.frame;
-                    n(frame)
-                        && frame.estimate == viewer.now.estimate
-                        && camera.as_ref().is_none_or(|camera| stands(camera) == stands(&frame.camera))
-                        && Arc::ptr_eq(&frame.opened, viewer.opened().unwrap())
+                    let snapshot = &painted.snapshot;
+                    n(snapshot)
+                        && snapshot.estimate == viewer.now.estimate
+                        && camera.as_ref().is_none_or(|camera| stands(camera) == stands(&snapshot.camera))
+                        && Arc::ptr_eq(&snapshot.opened, viewer.opened().unwrap())
                 })
         });
     }

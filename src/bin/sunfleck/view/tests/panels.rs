@@ -291,8 +291,8 @@ fn how_to_search_is_a_setting_that_can_be_undone() {
     assert_eq!(accel(&mut window), Some(Accelerator::Kd));
     window.wait("another estimate", move |viewer| viewer.now.estimate > estimate);
     window.wait_for_picture();
-    let frame = window.viewer().now.frame.clone().unwrap();
-    assert_eq!(frame.scene.accelerator(), Accelerator::Kd);
+    let snapshot = window.viewer().now.snapshot.clone().unwrap();
+    assert_eq!(snapshot.scene.accelerator(), Accelerator::Kd);
     let command = window.viewer().command().unwrap();
     assert!(command.contains(" --set accel=kd ") && command.matches("accel").count() == 1, "{command}");
     assert!(window.viewer().settings_text("a.toml".as_ref()).unwrap().contains("accel = \"kd\"\n"));
@@ -377,7 +377,7 @@ fn where_nothing_is_gathered_no_radius_is_shown() {
         window.viewer().wanted.painting.view = View::Radius;
         window.wait("radii", |viewer| {
             viewer.picture.painted().is_some_and(|painted| {
-                painted.painting.view == View::Radius && *painted.frame.settings == **viewer.edits.now()
+                painted.painting.view == View::Radius && *painted.snapshot.settings == **viewer.edits.now()
             })
         });
         let painted = window.viewer().picture.painted().unwrap().clone();

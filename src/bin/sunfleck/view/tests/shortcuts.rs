@@ -204,7 +204,9 @@ const CASES: &[Case] = &[
         Key::Space,
         |seen, window| {
             seen.wanted.restarts += 1;
-            window.wait("new estimate", |viewer| viewer.now.frame.as_ref().is_some_and(|frame| frame.estimate == 2));
+            window.wait("new estimate", |viewer| {
+                viewer.now.snapshot.as_ref().is_some_and(|snapshot| snapshot.estimate == 2)
+            });
         },
     ),
     case(Modifiers::NONE, Key::P, |seen, _| seen.wanted.paused = true),
@@ -212,7 +214,7 @@ const CASES: &[Case] = &[
         (seen.wanted.paused, seen.wanted.steps) = (true, 1);
         window.wait("one iteration more", |viewer| {
             viewer.now.phase == Phase::Paused
-                && viewer.now.frame.as_ref().is_some_and(|frame| frame.film.n_iterations == ITERATIONS + 1)
+                && viewer.now.snapshot.as_ref().is_some_and(|snapshot| snapshot.film.n_iterations == ITERATIONS + 1)
         });
     }),
     case(Modifiers::NONE, Key::Plus, |seen, _| edit(seen, |settings| settings.set("photons=1000").unwrap())),

@@ -65,7 +65,7 @@ fn compared_with_a_reference() {
     window.viewer().wanted.painting.comparison = Comparison::Wipe;
     window.wait("comparison", |viewer| {
         viewer.picture.painted().is_some_and(|painted| {
-            painted.painting.comparison == Comparison::Wipe && painted.frame.params.n_paths == 250
+            painted.painting.comparison == Comparison::Wipe && painted.snapshot.params.n_paths == 250
         })
     });
     window.wait_for_picture();

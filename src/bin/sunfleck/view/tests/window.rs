@@ -85,7 +85,10 @@ impl Guest for Vandal {
                 self.messages.push(text.to_owned());
             }
         }
-        let Some(at) = viewer.now.frame.as_ref().map(|frame| (frame.estimate, frame.film.n_iterations)) else { return };
+        let Some(at) = viewer.now.snapshot.as_ref().map(|snapshot| (snapshot.estimate, snapshot.film.n_iterations))
+        else {
+            return;
+        };
         if self.windows <= self.breaks {
             self.before = Some(at);
             if self.when == When::InFrame {
@@ -111,16 +114,16 @@ impl Guest for Onlooker {
     fn after_frame(&mut self, viewer: &Viewer, ui: &egui::Ui, _: &Drawn<'_>) {
         ui.ctx().request_repaint();
         assert!(self.began.elapsed() < PATIENCE, "{:?}", viewer.now.phase);
-        let Some(frame) = &viewer.now.frame else { return };
+        let Some(snapshot) = &viewer.now.snapshot else { return };
         let is_over = match &self.breaks {
             Some(renderer) => {
                 renderer.destroy();
                 self.failed_frames += usize::from(matches!(viewer.now.phase, Phase::Failed(_)));
                 self.failed_frames >= FEWEST_FRAMES
             }
-            None => frame.estimate > self.estimate,
+            None => snapshot.estimate > self.estimate,
         };
-        self.estimate = self.estimate.max(frame.estimate);
+        self.estimate = self.estimate.max(snapshot.estimate);
         if is_over {
             ui.ctx().send_viewport_cmd(Close);
         }
