@@ -14,7 +14,7 @@ use sunfleck::output::display::{self, Look};
 use sunfleck::output::false_colour::{self, Scale};
 use sunfleck::output::flip::{self, flip};
 use sunfleck::output::histogram::Histogram;
-use sunfleck::output::tonemap::{ToneMap, srgb_encode};
+use sunfleck::output::tonemap::{self, ToneMap, srgb_encode};
 
 use super::colours::{Colours, Legend, Values, far, image, in_false_colour, on_display, plain, reduced, scalar, stops};
 use super::{Reference, Snapshot};
@@ -260,10 +260,15 @@ pub fn fitting<'a>(reference: Option<&'a Arc<Reference>>, snapshot: &Snapshot) -
     reference.filter(|r| (r.picture.size, r.picture.crop) == (snapshot.params.size, snapshot.params.crop))
 }
 
+/// From the automatic exposure of a preview to the one it is shown with, stops.
+const MOST_OFF: f32 = 0.25;
+
 /// What is kept from one snapshot to the next.
 #[derive(Default)]
 pub struct Painter {
     halves: (u64, Halves),
+    /// Automatic, of what was painted last; stops.
+    exposure: Option<f32>,
     hits: Option<(Arc<Snapshot>, FirstHits)>,
     reference: Option<ReferenceImage>,
 }
@@ -308,7 +313,7 @@ impl Painter {
         painting: Painting,
     ) -> Painted {
         let picture = snapshot.picture();
-        let exposure = painting.look.exposure_of(&picture.rgb);
+        let exposure = painting.look.exposure.unwrap_or_else(|| self.automatic_exposure(snapshot, &picture));
         let reference = self.reference(fitting(reference.as_ref(), snapshot), painting, exposure);
         let histogram = Histogram::of(&picture.rgb, exposure);
         let mut problem = None;
@@ -348,6 +353,17 @@ impl Painter {
             problem,
             reduced: None,
         }
+    }
+
+    /// That of a preview stays where it was, as far as it can: few pixels and photons would make it flicker as the camera moves.
+    fn automatic_exposure(&mut self, snapshot: &Snapshot, picture: &Picture) -> f32 {
+        let own = tonemap::automatic_exposure(&picture.rgb);
+        let shown = match self.exposure {
+            Some(before) if snapshot.is_preview => before.clamp(own - MOST_OFF, own + MOST_OFF),
+            _ => own,
+        };
+        self.exposure = Some(shown);
+        shown
     }
 
     /// The reference as the picture is shown; made again only where that has changed.

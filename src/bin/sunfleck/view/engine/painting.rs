@@ -289,6 +289,37 @@ mod tests {
     }
 
     #[test]
+    fn previews_flicker_less_than_their_light() {
+        let ([first, ..], _) = snapshots();
+        let lit = |stops: f32, is_preview| {
+            let mut film = first.film.as_ref().clone();
+            film.pixels.iter_mut().flatten().for_each(|c| *c *= stops.exp2());
+            Arc::new(Snapshot { film: Arc::new(film), is_preview, ..Snapshot::clone(&first) })
+        };
+        let mut painter = Painter::default();
+        let mut exposure =
+            |stops, is_preview| painter.paint(&lit(stops, is_preview), None, Painting::default()).exposure;
+        let own = exposure(0.0, false);
+        for (stops, is_preview, shown) in [
+            (0.1, true, 0.0),
+            (-0.2, true, 0.0),
+            (1.0, true, -0.75),
+            (0.9, true, -0.75),
+            (0.9, false, -0.9),
+            (-2.0, true, 1.75),
+        ] {
+            let off = exposure(stops, is_preview) - own - shown;
+            assert!(off.abs() < 1e-3, "{stops} {is_preview}: {off}");
+        }
+        // Given, it is what is given, and no preview begins there.
+        let painting =
+            Painting { look: display::Look { exposure: Some(3.0), ..Default::default() }, ..Painting::default() };
+        assert_eq!(painter.paint(&lit(0.0, true), None, painting).exposure, 3.0);
+        let off = painter.paint(&lit(-2.0, true), None, Painting::default()).exposure - own - 1.75;
+        assert!(off.abs() < 1e-3, "{off}");
+    }
+
+    #[test]
     fn a_difference_ends_where_it_is_told_to() {
         let ([first, second, _], _) = snapshots();
         let mut picture = first.picture();
