@@ -19,6 +19,7 @@ use super::files;
 use super::messages::Messages;
 use super::picture::PictureView;
 use super::remembered::{Memory, Remembered};
+use super::settings::Said;
 use super::state::{Edits, LimitsOfScenes};
 use crate::cli::{Usage, ViewArgs};
 use crate::scenes::Source;
@@ -339,10 +340,9 @@ impl Viewer {
             ToneMap::Agx => ToneMap::Srgb,
             ToneMap::Srgb => ToneMap::Neutral,
         };
-        // As it was in the beginning, nothing is said.
         let read = self.editing.as_ref().and_then(|opened| opened.read.tonemap);
-        let said = if next == read.unwrap_or_default() { read } else { Some(next) };
-        self.show_otherwise(ui, "tone curve", |s| s.tonemap = said);
+        let said = Said { now: self.edits.now().tonemap, read, default: ToneMap::default() };
+        self.show_otherwise(ui, "tone curve", |s| s.tonemap = said.saying(next));
     }
 
     /// One iteration, then a pause.

@@ -8,7 +8,7 @@ use egui::{
 };
 
 use super::number::{Number, drag_sized};
-use super::widgets::named;
+use super::widgets::{keep_keys, named};
 
 /// Of what is in the window that opens, points.
 const WIDTH: f32 = 210.0;
@@ -34,7 +34,7 @@ pub fn color(ui: &mut Ui, name: &str, color: &mut [f32; 3], most: Option<f32>) -
     // That of menus has no frames around fields.
     let style = ui.style().clone();
     let popup = Popup::menu(&response).close_behavior(PopupCloseBehavior::CloseOnClickOutside);
-    popup.width(WIDTH).show(|ui| {
+    let shown = popup.width(WIDTH).show(|ui| {
         ui.set_style(style);
         ui.set_width(WIDTH);
         ui.style_mut().interaction.selectable_labels = false;
@@ -59,6 +59,7 @@ pub fn color(ui: &mut Ui, name: &str, color: &mut [f32; 3], most: Option<f32>) -
             ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Escape));
         }
     });
+    keep_keys(ui, &response, shown.is_some());
     if *color != old {
         response.mark_changed();
     }

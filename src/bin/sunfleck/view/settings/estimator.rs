@@ -8,6 +8,7 @@ use sunfleck::scene::settings::{Count, Direct, FirstRadius, Index, Kernel, Setti
 
 use super::number::{NO_LIMIT, Number, log_slider, metres, rounded, slider, whole};
 use super::widgets::{Name, choice, row};
+use super::{Said, setting};
 use crate::view::app::Viewer;
 
 const PHOTONS: Name = Name {
@@ -71,36 +72,27 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     let now = &*viewer.settings();
     let defaults = Params::new(1, 1);
 
-    let mut photons = f64::from(now.photons.map_or(defaults.n_paths, |n| n.0));
-    let mut changed = None;
-    let reset = row(ui, PHOTONS, now.photons != read.photons, |ui| {
-        let response = log_slider(ui, &mut photons, Number::Count, 1e3..=2e7);
+    let said = Said { now: now.photons, read: read.photons, default: Count(defaults.n_paths) };
+    let photons = |ui: &mut Ui, photons: &mut Count| {
+        let mut n = f64::from(photons.0);
+        let response = log_slider(ui, &mut n, Number::Count, 1e3..=2e7);
         if response.changed() {
-            let n = if response.dragged() { rounded(photons) } else { photons };
-            changed = Some(n.clamp(1.0, f64::from(u32::MAX)) as u32);
+            let n = if response.dragged() { rounded(n) } else { n };
+            *photons = Count(n.clamp(1.0, f64::from(u32::MAX)) as u32);
         }
         response
-    });
-    if let Some(n) = changed {
-        viewer.edit(ui, "photons", |s| s.photons = Some(Count(n)));
-    }
-    if reset {
-        viewer.reset(ui, |s| s.photons = read.photons);
-    }
+    };
+    setting(ui, viewer, PHOTONS, said, photons, |s, photons| s.photons = photons);
 
-    let mut alpha = f64::from(now.alpha.unwrap_or(defaults.alpha));
-    let mut changed = false;
-    let reset = row(ui, ALPHA, now.alpha != read.alpha, |ui| {
-        let response = slider(ui, &mut alpha, Number::Plain, 0.01..=0.99);
-        changed = response.changed();
+    let said = Said { now: now.alpha, read: read.alpha, default: defaults.alpha };
+    let alpha = |ui: &mut Ui, alpha: &mut f32| {
+        let mut shown = f64::from(*alpha);
+        let response = slider(ui, &mut shown, Number::Plain, 0.01..=0.99);
+        // Typed, it may be anything.
+        *alpha = Some(shown as f32).filter(|&shown| is_alpha(shown)).unwrap_or(*alpha);
         response
-    });
-    if changed && is_alpha(alpha as f32) {
-        viewer.edit(ui, "alpha", |s| s.alpha = Some(alpha as f32));
-    }
-    if reset {
-        viewer.reset(ui, |s| s.alpha = read.alpha);
-    }
+    };
+    setting(ui, viewer, ALPHA, said, alpha, |s, alpha| s.alpha = alpha);
 
     radius(ui, viewer, read, now);
 
@@ -124,19 +116,15 @@ fn pick<T: Copy + PartialEq>(
     set: fn(&mut Settings, Option<T>),
 ) {
     let is_listed = |value: &T| all.iter().any(|(listed, ..)| listed == value);
-    let mut value = now.filter(is_listed).unwrap_or(all[0].0);
-    let mut changed = false;
-    let reset = row(ui, name, now != read, |ui| {
-        let response = ui.add_enabled_ui(all.len() > 1, |ui| choice(ui, name.name, &mut value, all)).inner;
-        changed = response.changed();
+    let control = |ui: &mut Ui, value: &mut T| {
+        let mut shown = Some(*value).filter(is_listed).unwrap_or(all[0].0);
+        let response = ui.add_enabled_ui(all.len() > 1, |ui| choice(ui, name.name, &mut shown, all)).inner;
+        if response.changed() {
+            *value = shown;
+        }
         response
-    });
-    if changed {
-        viewer.edit(ui, name.name, |s| set(s, Some(value)));
-    }
-    if reset {
-        viewer.reset(ui, |s| set(s, read));
-    }
+    };
+    setting(ui, viewer, name, Said { now, read, default: all[0].0 }, control, set);
 }
 
 fn radius(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, now: &Settings) {
@@ -169,8 +157,9 @@ fn radius(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, now: &Settings) {
         });
     }
     if changed {
-        let radius = fixed.map_or(FirstRadius::Automatic, FirstRadius::Fixed);
-        viewer.edit(ui, "radius", |s| s.radius = Some(radius));
+        let said = Said { now: now.radius, read: read.radius, default: FirstRadius::Automatic };
+        let radius = said.saying(fixed.map_or(FirstRadius::Automatic, FirstRadius::Fixed));
+        viewer.edit(ui, "radius", |s| s.radius = radius);
     }
     if reset {
         viewer.reset(ui, |s| s.radius = read.radius);
@@ -179,36 +168,17 @@ fn radius(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, now: &Settings) {
 
 /// The longest path and the seed.
 fn numbers(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, now: &Settings) {
-    let mut longest = now.max_segments.unwrap_or(0);
-    let mut changed = false;
-    let reset = row(ui, LONGEST, now.max_segments != read.max_segments, |ui| {
-        let drag = egui::DragValue::new(&mut longest).speed(1.0).range(0..=u32::MAX);
+    let size = |ui: &Ui| egui::vec2(ui.available_width(), ui.spacing().interact_size.y);
+    let longest = |ui: &mut Ui, longest: &mut u32| {
+        let drag = egui::DragValue::new(longest).speed(1.0).range(0..=u32::MAX);
         let drag = drag.custom_formatter(|n, _| if n < 0.5 { NO_LIMIT.to_owned() } else { format!("{n:.0}") });
-        let response = whole(ui, egui::vec2(ui.available_width(), ui.spacing().interact_size.y), drag);
-        changed = response.changed();
-        response
-    });
-    if changed {
-        viewer.edit(ui, "longest path", |s| s.max_segments = (longest > 0).then_some(longest));
-    }
-    if reset {
-        viewer.reset(ui, |s| s.max_segments = read.max_segments);
-    }
+        whole(ui, size(ui), drag)
+    };
+    let said = Said { now: now.max_segments, read: read.max_segments, default: 0 };
+    setting(ui, viewer, LONGEST, said, longest, |s, longest| s.max_segments = longest.filter(|&n| n > 0));
 
-    let mut seed = now.seed.unwrap_or(0);
-    let mut changed = false;
-    let reset = row(ui, SEED, now.seed != read.seed, |ui| {
-        let drag = egui::DragValue::new(&mut seed).speed(1.0);
-        let response = whole(ui, egui::vec2(ui.available_width(), ui.spacing().interact_size.y), drag);
-        changed = response.changed();
-        response
-    });
-    if changed {
-        viewer.edit(ui, "seed", |s| s.seed = Some(seed));
-    }
-    if reset {
-        viewer.reset(ui, |s| s.seed = read.seed);
-    }
+    let seed = |ui: &mut Ui, seed: &mut u32| whole(ui, size(ui), egui::DragValue::new(seed).speed(1.0));
+    setting(ui, viewer, SEED, Said { now: now.seed, read: read.seed, default: 0 }, seed, |s, seed| s.seed = seed);
 }
 
 /// To two significant digits.

@@ -7,6 +7,7 @@ use sunfleck::scene::settings::{MAX_EXPOSURE, MAX_SIDE, Settings, Size};
 
 use super::number::{Number, slider, whole};
 use super::widgets::{Name, choice, menu, named, row};
+use super::{Said, setting};
 use crate::view::app::Viewer;
 
 const SIZE: Name = Name { name: "Size", hint: "Width and height of the picture, pixels. Restarts the estimate." };
@@ -35,28 +36,13 @@ const PRESETS: [([u32; 2], &str); 8] = [
 pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     size(ui, viewer, read);
     exposure(ui, viewer, read);
-    let mut changed = false;
-    let mut tone = viewer.look().tonemap;
-    let reset = row(ui, TONE, tone != read.tonemap.unwrap_or_default(), |ui| {
-        let all = [
-            (
-                ToneMap::Neutral,
-                "PBR Neutral",
-                "Khronos PBR Neutral: colours stay as they are, highlights are compressed.",
-            ),
-            (ToneMap::Agx, "AgX", "Film-like: bright saturated colours fade to white."),
-            (ToneMap::Srgb, "sRGB", "None: what is too bright is cut off."),
-        ];
-        let response = choice(ui, "tone", &mut tone, &all);
-        changed = response.changed();
-        response
-    });
-    if changed {
-        viewer.show_otherwise(ui, "tone curve", |s| s.tonemap = Some(tone));
-    }
-    if reset {
-        viewer.reset(ui, |s| s.tonemap = read.tonemap);
-    }
+    let tones = [
+        (ToneMap::Neutral, "PBR Neutral", "Khronos PBR Neutral: colours stay as they are, highlights are compressed."),
+        (ToneMap::Agx, "AgX", "Film-like: bright saturated colours fade to white."),
+        (ToneMap::Srgb, "sRGB", "None: what is too bright is cut off."),
+    ];
+    let said = Said { now: viewer.settings().tonemap, read: read.tonemap, default: ToneMap::default() };
+    setting(ui, viewer, TONE, said, |ui, tone| choice(ui, "tone", tone, &tones), |s, tone| s.tonemap = tone);
 }
 
 fn size(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {

@@ -10,6 +10,7 @@ use super::color::color;
 use super::number::{Number, Scale};
 use super::scene::tidy;
 use super::widgets::{Name, list, row};
+use super::{Said, setting};
 use crate::view::app::Viewer;
 
 const MATERIAL: Name = Name { name: "Material", hint: "Click on a surface in the picture, or choose here." };
@@ -114,44 +115,29 @@ fn properties(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, 
     let was = read.clone().material_mut(scene, index).clone();
     let before = viewer.settings().as_ref().clone().material_mut(scene, index).clone();
     let color_row = |ui: &mut Ui, viewer: &mut Viewer, name: Name, field: ColorField, own: Vec3, most: f32| {
-        let (value, old) = (*field(&mut before.clone()), *field(&mut was.clone()));
-        let mut shown = value.unwrap_or(own.to_array());
-        let mut changed = false;
-        let reset = row(ui, name, value != old, |ui| {
-            let response = color(ui, name.name, &mut shown, Some(most));
-            changed = response.changed();
+        let [now, read_so] = [&before, &was].map(|settings| *field(&mut settings.clone()));
+        let said = Said { now, read: read_so, default: own.to_array() };
+        let control = |ui: &mut Ui, shown: &mut [f32; 3]| {
+            let response = color(ui, name.name, shown, Some(most));
+            *shown = shown.map(|c| c.clamp(0.0, most));
             response
+        };
+        setting(ui, viewer, name, said, control, |s, color| {
+            *field(s.material_mut(scene, index)) = color;
+            tidy(s, read);
         });
-        if changed {
-            let shown = shown.map(|c| c.clamp(0.0, most));
-            viewer.edit(ui, name.name, |s| *field(s.material_mut(scene, index)) = Some(shown));
-        }
-        if reset {
-            viewer.reset(ui, |s| {
-                *field(s.material_mut(scene, index)) = old;
-                tidy(s, read);
-            });
-        }
     };
     let number_row = |ui: &mut Ui, viewer: &mut Viewer, property: Property| {
         let Property { name, field, own, scale, idle } = property;
-        let (value, old) = (*field(&mut before.clone()), *field(&mut was.clone()));
-        let mut shown = value.unwrap_or(own);
-        let mut changed = false;
-        let reset = row(ui, name, value != old, |ui| {
-            let response = ui.add_enabled_ui(idle.is_none(), |ui| scale.show(ui, &mut shown)).inner;
-            changed = response.changed();
+        let [now, read_so] = [&before, &was].map(|settings| *field(&mut settings.clone()));
+        let control = |ui: &mut Ui, shown: &mut f32| {
+            let response = ui.add_enabled_ui(idle.is_none(), |ui| scale.show(ui, shown)).inner;
             response.on_disabled_hover_text(idle.unwrap_or_default())
+        };
+        setting(ui, viewer, name, Said { now, read: read_so, default: own }, control, |s, number| {
+            *field(s.material_mut(scene, index)) = number;
+            tidy(s, read);
         });
-        if changed {
-            viewer.edit(ui, name.name, |s| *field(s.material_mut(scene, index)) = Some(shown));
-        }
-        if reset {
-            viewer.reset(ui, |s| {
-                *field(s.material_mut(scene, index)) = old;
-                tidy(s, read);
-            });
-        }
     };
     color_row(ui, viewer, BASE_COLOR, |m| &mut m.base_color, own.base_color, 1.0);
     let unit = |name, field, own| Property { name, field, own, scale: Scale::UNIT, idle: None };

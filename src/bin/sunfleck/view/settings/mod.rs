@@ -12,10 +12,11 @@ pub mod widgets;
 use std::sync::Arc;
 
 use eframe::egui;
-use egui::Ui;
+use egui::{Response, Ui};
 use sunfleck::scene::settings::Settings;
 
 use super::app::Viewer;
+use widgets::{Name, row};
 
 type Group = fn(&mut Ui, &mut Viewer, &Settings);
 
@@ -57,6 +58,49 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer) {
             ui.add_space(2.0);
         }
     });
+}
+
+/// What settings say of something now, what the file says, and what it is where nothing is said.
+pub struct Said<T> {
+    pub now: Option<T>,
+    pub read: Option<T>,
+    pub default: T,
+}
+
+impl<T: Clone + PartialEq> Said<T> {
+    fn value(&self) -> T {
+        self.now.as_ref().unwrap_or(&self.default).clone()
+    }
+
+    /// How settings say another `value`: not at all, if that does and the file does not either.
+    pub fn saying(&self, value: T) -> Option<T> {
+        (self.read.is_some() || value != self.default).then_some(value)
+    }
+}
+
+/// A row for something that settings say: its control, and its way back.
+fn setting<T: Clone + PartialEq>(
+    ui: &mut Ui,
+    viewer: &mut Viewer,
+    name: Name,
+    said: Said<T>,
+    control: impl FnOnce(&mut Ui, &mut T) -> Response,
+    set: impl Fn(&mut Settings, Option<T>),
+) {
+    let mut value = said.value();
+    let mut changed = false;
+    let reset = row(ui, name, said.now != said.read, |ui| {
+        let response = control(ui, &mut value);
+        changed = response.changed();
+        response
+    });
+    if changed {
+        let value = said.saying(value);
+        viewer.edit(ui, name.name, |s| set(s, value));
+    }
+    if reset {
+        viewer.reset(ui, |s| set(s, said.read));
+    }
 }
 
 impl Viewer {

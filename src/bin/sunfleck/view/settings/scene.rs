@@ -11,6 +11,7 @@ use sunfleck::scene::{PunctualKind, PunctualLight, Scene};
 use super::color::color;
 use super::number::{Number, Scale, drag_sized};
 use super::widgets::{Name, back, choice, row};
+use super::{Said, setting};
 use crate::view::app::Viewer;
 use crate::view::files::{self, name_of};
 
@@ -111,7 +112,7 @@ pub fn environment(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
         });
         if changed || reset {
             let color = if reset { was.color } else { Some(radiance) };
-            edit_sky(ui, viewer, "environment colour", read, |sky| sky.color = color);
+            viewer.edit(ui, "environment colour", |s| change_sky(s, read, |sky| sky.color = color));
         }
     }
     let (rotation, strength) = match sky {
@@ -123,18 +124,18 @@ pub fn environment(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
         Property { name: STRENGTH, field: |sky| &mut sky.strength, own: strength, scale: Scale::factor(100.0) },
     ];
     for Property { name, field, own, scale } in properties {
-        let (value, old) = (*field(&mut given.clone()), *field(&mut was.clone()));
-        let mut shown = value.unwrap_or(own);
-        let mut changed = false;
-        let reset = row(ui, name, value != old, |ui| {
-            let response = scale.show(ui, &mut shown);
-            changed = response.changed();
-            response
-        });
-        if changed || reset {
-            let value = if reset { old } else { Some(shown) };
-            edit_sky(ui, viewer, name.name, read, |sky| *field(sky) = value);
-        }
+        let [now, read_so] = [&given, &was].map(|sky| *field(&mut sky.clone()));
+        let said = Said { now, read: read_so, default: own };
+        setting(
+            ui,
+            viewer,
+            name,
+            said,
+            |ui, shown| scale.show(ui, shown),
+            |s, value| {
+                change_sky(s, read, |sky| *field(sky) = value);
+            },
+        );
     }
 }
 
@@ -151,38 +152,20 @@ const TURN: Scale =
     Scale { number: Number::Degrees, range: [-180.0, 180.0], is_logarithmic: false, allowed: [f32::MIN, f32::MAX] };
 
 /// Nothing is left where nothing is said.
-fn edit_sky(
-    ui: &Ui,
-    viewer: &mut Viewer,
-    what: &'static str,
-    read: &Settings,
-    change: impl FnOnce(&mut EnvironmentSettings),
-) {
-    viewer.edit(ui, what, |s| {
-        let mut sky = s.environment.take().unwrap_or_default();
-        change(&mut sky);
-        let is_empty = sky == EnvironmentSettings::default() && read.environment.is_none();
-        s.environment = (!is_empty).then_some(sky);
-    });
+fn change_sky(settings: &mut Settings, read: &Settings, change: impl FnOnce(&mut EnvironmentSettings)) {
+    let mut sky = settings.environment.take().unwrap_or_default();
+    change(&mut sky);
+    let is_empty = sky == EnvironmentSettings::default() && read.environment.is_none();
+    settings.environment = (!is_empty).then_some(sky);
 }
 
 pub fn lights(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     let Some(opened) = viewer.opened().cloned() else { return };
     let scene = &opened.loaded.scene;
     let now = viewer.settings();
-    let mut scale = now.light_scale.unwrap_or(1.0);
-    let mut changed = false;
-    let reset = row(ui, SCALE, now.light_scale != read.light_scale, |ui| {
-        let response = Scale::factor(100.0).show(ui, &mut scale);
-        changed = response.changed();
-        response
-    });
-    if changed {
-        viewer.edit(ui, "light scale", |s| s.light_scale = Some(scale));
-    }
-    if reset {
-        viewer.reset(ui, |s| s.light_scale = read.light_scale);
-    }
+    let said = Said { now: now.light_scale, read: read.light_scale, default: 1.0 };
+    let control = |ui: &mut Ui, scale: &mut f32| Scale::factor(100.0).show(ui, scale);
+    setting(ui, viewer, SCALE, said, control, |s, scale| s.light_scale = scale);
     if scene.lights.is_empty() {
         ui.weak("The scene has no point, spot or directional lights.");
         return;
@@ -224,7 +207,7 @@ fn light(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, i: us
                         egui::TextStyle::Button,
                     );
                     if ui.add(egui::Checkbox::new(&mut on, title)).on_hover_text(hint).changed() {
-                        now.on = Some(on);
+                        now.on = Said { now: now.on, read: was.on, default: true }.saying(on);
                     }
                 },
             );
@@ -233,7 +216,7 @@ fn light(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, i: us
                 "Its colour, linear RGB, of which only the ratio matters: it stays as bright. Restarts the estimate.";
             let response = color(ui, &format!("Colour of {name}"), &mut rgb, None).on_hover_text(hint);
             if response.changed() && rgb != [0.0; 3] {
-                now.color = Some(rgb);
+                now.color = Said { now: now.color, read: was.color, default: hue(light.intensity) }.saying(rgb);
             }
             let mut strength = now.strength.unwrap_or(1.0);
             let speed = f64::from(0.01 * strength.max(0.1));
@@ -242,7 +225,7 @@ fn light(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, i: us
             let hint =
                 format!("Factor on its {:.4} {}. Restarts the estimate.", light.intensity.max_element(), unit(light));
             if response.on_hover_text(hint).changed() {
-                now.strength = Some(strength);
+                now.strength = Said { now: now.strength, read: was.strength, default: 1.0 }.saying(strength);
             }
             if before != was {
                 reset = back(ui, &name);
@@ -255,7 +238,10 @@ fn light(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, i: us
             tidy(s, read);
         });
     } else if now != before {
-        viewer.edit(ui, "light", |s| *s.scene_light_mut(scene, i) = now);
+        viewer.edit(ui, "light", |s| {
+            *s.scene_light_mut(scene, i) = now;
+            tidy(s, read);
+        });
     }
 }
 

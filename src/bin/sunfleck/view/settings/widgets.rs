@@ -111,16 +111,16 @@ fn close_on_choice(ui: &mut Ui, items: impl FnOnce(&mut Ui)) {
     }
 }
 
-/// What was opened and used by keyboard has the keys again when it closes, however it does: they are no shortcuts then.
+/// What was opened by keyboard has the keys again when it closes, however it does, unless the mouse was used meanwhile: they
+/// are no shortcuts then.
 pub fn keep_keys(ui: &Ui, opener: &Response, is_open: bool) {
     let id = opener.id.with("has the keys");
-    let had_keys = ui.data_mut(|data| data.remove_temp(id)).unwrap_or(false);
+    let before = ui.data_mut(|data| data.remove_temp::<bool>(id));
     let is_clicked = ui.input(|i| i.pointer.any_pressed() || i.pointer.any_released());
-    // Escape takes the focus from what is in it as it closes it.
-    let has_keys = !is_clicked && (had_keys || ui.memory(|memory| memory.focused().is_some()));
+    let has_keys = !is_clicked && before.unwrap_or_else(|| opener.has_focus());
     if is_open {
         ui.data_mut(|data| data.insert_temp(id, has_keys));
-    } else if had_keys && has_keys {
+    } else if before.is_some() && has_keys {
         opener.request_focus();
     }
 }

@@ -9,6 +9,7 @@ use sunfleck::scene::settings::{CameraSettings, Count, EnvironmentSettings, Firs
 use super::Window;
 use super::panels::bare;
 use crate::view::engine::is_asked_anew;
+use crate::view::settings::Said;
 
 /// With all groups of the settings open, and nothing beside them.
 fn panel(set: impl FnOnce(&mut Settings)) -> Window {
@@ -90,6 +91,28 @@ fn awkward(settings: &mut Settings) {
     settings.radius = Some(FirstRadius::Fixed(2e-9));
     let sky = settings.environment.insert(EnvironmentSettings::default());
     (sky.color, sky.strength, sky.rotation_degrees) = (Some([2.0, 1.5, 0.5]), Some(123.456_7), Some(-37.123_45));
+}
+
+/// As if nothing had been said: nothing to take back, nothing in the command.
+#[test]
+fn what_is_set_back_by_hand_is_not_said() {
+    let mut window = panel(|_| {});
+    let before = window.viewer().edits.now().clone();
+    for (row, typed, back) in [
+        ("Alpha", "0.5", "0.6666667"),
+        ("Longest path", "9", "no limit"),
+        ("Seed", "7", "0"),
+        ("Metallic", "0.5", "0"),
+        ("Light scale", "2", "1"),
+    ] {
+        enter(&mut window, row, 0, typed);
+        assert_ne!(*window.viewer().edits.now(), before, "{row}");
+        enter(&mut window, row, 0, back);
+        assert_eq!(*window.viewer().edits.now(), before, "{row}");
+    }
+    // But what the file says is said.
+    let said = Said { now: Some(7), read: Some(0), default: 0 };
+    assert_eq!([said.saying(0), said.saying(4)], [Some(0), Some(4)]);
 }
 
 #[test]
