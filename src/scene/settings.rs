@@ -63,7 +63,7 @@ pub struct Settings {
     /// Picture, pixels: `[width, height]` or `"1280x720"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size: Option<Size>,
-    /// Photon paths emitted an iteration: a number or text such as `"500k"`.
+    /// Photons emitted an iteration: a number or text such as `"500k"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub photons: Option<Count>,
     /// Share of the radius' area that an iteration keeps, Knaus & Zwicker's α in (0, 1).

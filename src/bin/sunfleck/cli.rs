@@ -234,7 +234,7 @@ pub struct ViewArgs {
     #[arg(long, value_name = "FILE")]
     pub env: Option<PathBuf>,
 
-    /// Photon paths an iteration, such as 500k or 2M [default: 500k]
+    /// Photons emitted an iteration, such as 500k or 2M [default: 500k]
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = parse_count)]
     pub photons: Option<u32>,
 
@@ -297,7 +297,7 @@ pub struct InputArgs {
     #[arg(long, value_name = "x0,x1,y0,y1", allow_hyphen_values = true, value_parser = crop, help_heading = "Picture")]
     pub crop: Option<Crop>,
 
-    /// Photon paths an iteration, such as 500k or 2M [default: 500k]
+    /// Photons emitted an iteration, such as 500k or 2M [default: 500k]
     #[arg(long, value_name = "N", allow_hyphen_values = true, value_parser = parse_count, help_heading = "Estimator")]
     pub photons: Option<u32>,
 

@@ -224,8 +224,7 @@ pub fn needs_more(params: &Params, before: &Params) -> bool {
 /// whose place they take.
 pub fn check_memory(params: &Params, held: Option<&Params>) -> Result<()> {
     let [width, height] = params.film_size();
-    let what =
-        [format!("a picture of {width}x{height} pixels"), format!("{} photon paths an iteration", params.n_paths)];
+    let what = [format!("a picture of {width}x{height} pixels"), format!("{} photons an iteration", params.n_paths)];
     let available = available_memory().saturating_add(held.map_or(0, |held| needed(held).iter().sum()));
     for (bytes, what) in needed(params).into_iter().zip(what) {
         ensure!(

@@ -119,13 +119,17 @@ impl SceneLightSettings {
     pub(super) fn apply(&self, lights: &mut [PunctualLight], place: &str) -> Result<(), Wrong> {
         let names = lights.iter().map(|light| light.name.as_str()).collect();
         for i in targets("light", place, self.name.as_deref(), self.index, names)? {
-            let intensity = &mut lights[i].intensity;
-            if let Some(color) = self.color.map(Vec3::from) {
-                *intensity = color * (luminance(*intensity) / luminance(color));
-            }
-            *intensity *= if self.on == Some(false) { 0.0 } else { self.strength.unwrap_or(1.0) };
+            self.change(&mut lights[i]);
         }
         Ok(())
+    }
+
+    fn change(&self, light: &mut PunctualLight) {
+        let intensity = &mut light.intensity;
+        if let Some(color) = self.color.map(Vec3::from) {
+            *intensity = color * (luminance(*intensity) / luminance(color));
+        }
+        *intensity *= if self.on == Some(false) { 0.0 } else { self.strength.unwrap_or(1.0) };
     }
 }
 
@@ -142,6 +146,35 @@ impl Settings {
     pub fn scene_light_mut(&mut self, scene: &Scene, index: usize) -> &mut SceneLightSettings {
         only_item(&mut self.scene_lights, scene.lights.iter().map(|light| light.name.as_str()), index)
     }
+
+    /// A material of `scene` without the changes of [`Settings::material_mut`]: as its file has it, or as what else means its name
+    /// makes it.
+    pub fn material_without(&self, scene: &Scene, index: usize) -> Material {
+        let mut material = scene.materials[index].clone();
+        let names = scene.materials.iter().map(|material| material.name.as_str());
+        for item in other_items(&self.materials, names, index) {
+            item.change(&mut material);
+        }
+        material
+    }
+
+    /// The same of a punctual light; see [`Settings::scene_light_mut`].
+    pub fn scene_light_without(&self, scene: &Scene, index: usize) -> PunctualLight {
+        let mut light = scene.lights[index].clone();
+        for item in other_items(&self.scene_lights, scene.lights.iter().map(|light| light.name.as_str()), index) {
+            item.change(&mut light);
+        }
+        light
+    }
+}
+
+/// The items that change the thing of that number, in turn, without the one that [`only_item`] gives.
+fn other_items<'n, T: Item + Clone>(list: &[T], names: impl Iterator<Item = &'n str> + Clone, index: usize) -> Vec<T> {
+    let name = names.clone().nth(index);
+    let mut items = list.to_vec();
+    *only_item(&mut items, names, index) = T::new(None, None);
+    items.retain(|item| item.index() == Some(index) || item.name().is_some() && item.name() == name);
+    items
 }
 
 /// An item of a list of changes.

@@ -226,6 +226,17 @@ fn several_changes_of_one_thing_become_one() {
     let twin = settings.material_mut(&scene, 2).clone();
     assert_eq!((twin.metallic, twin.ior, settings.materials.len()), (Some(1.0), Some(2.0), 3));
     assert_eq!(changed(&settings), changed(&file));
+    // Without its own changes it is as those of all of its name make it.
+    let without = settings.material_without(&scene, 2);
+    assert_eq!((without.roughness, without.ior), (0.5, scene.materials[2].ior));
+    assert_eq!(settings.material_without(&scene, 0).roughness, scene.materials[0].roughness);
+    let without = settings.scene_light_without(&scene, 1);
+    assert_eq!(without.intensity, scene.lights[1].intensity);
+    let mut twins = scene.clone();
+    twins.lights[0].name.clone_from(&twins.lights[1].name);
+    let text = "[[scene_light]]\nname = \"sun\"\ncolor = [1, 0, 0]\n[[scene_light]]\nindex = 1\ncolor = [0, 1, 0]\n";
+    let red = parse(text).scene_light_without(&twins, 1).intensity;
+    assert!(red.x > 0.0 && red.y == 0.0, "{red}");
 }
 
 #[test]

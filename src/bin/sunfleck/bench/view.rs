@@ -19,6 +19,7 @@ use super::{Common, Where, backends};
 use crate::cli::values::{number, size};
 use crate::devices;
 use crate::view::measure::{self, Figures, Frames, Plan};
+use crate::view::memory;
 use crate::view::timing::percentile;
 
 const NOTES: &[&str] = &[
@@ -76,6 +77,7 @@ fn scale(text: &str) -> Result<f32, String> {
 }
 
 pub fn run(args: &ViewBenchArgs) -> Result<()> {
+    memory::give_back_large();
     let common = &args.common;
     common.prepare("view", &[])?;
     let backends = backends::names(&args.place.backend);

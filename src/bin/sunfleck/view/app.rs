@@ -8,7 +8,6 @@ use anyhow::{Result, bail};
 use eframe::egui;
 use egui::Color32;
 use sunfleck::output::display::Look;
-use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::Camera;
 use sunfleck::scene::settings::{MAX_EXPOSURE, Settings};
 
@@ -19,7 +18,6 @@ use super::files;
 use super::messages::Messages;
 use super::picture::PictureView;
 use super::remembered::{Memory, Remembered};
-use super::settings::Said;
 use super::state::{Edits, LimitsOfScenes};
 use crate::cli::{Usage, ViewArgs};
 use crate::scenes::Source;
@@ -332,17 +330,6 @@ impl Viewer {
     pub fn toggle_inspect(&mut self, width: f32) {
         self.remembered.show_inspect = !self.shows_inspect(width);
         self.remembered.show_settings &= !self.remembered.show_inspect || width >= LEAST_FOR_BOTH;
-    }
-
-    pub fn next_tone(&mut self, ui: &egui::Ui) {
-        let next = match self.look().tonemap {
-            ToneMap::Neutral => ToneMap::Agx,
-            ToneMap::Agx => ToneMap::Srgb,
-            ToneMap::Srgb => ToneMap::Neutral,
-        };
-        let read = self.editing.as_ref().and_then(|opened| opened.read.tonemap);
-        let said = Said { now: self.edits.now().tonemap, read, default: ToneMap::default() };
-        self.show_otherwise(ui, "tone curve", |s| s.tonemap = said.saying(next));
     }
 
     /// One iteration, then a pause.

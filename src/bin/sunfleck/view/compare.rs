@@ -231,11 +231,14 @@ fn range(ui: &mut egui::Ui, viewer: &mut Viewer, measure: Measure) {
             *end = is_given.then_some(automatic);
         }
         if let Some(end) = end {
-            let speed = 0.01 * f64::from(*end);
-            let field = drag(ui, end, Number::Plain, speed, 0.0..=f32::MAX);
+            let (speed, mut typed) = (0.01 * f64::from(*end), *end);
+            let field = drag(ui, &mut typed, Number::Plain, speed, 0.0..=f32::MAX);
+            // A drag comes near to 0, which is automatic, and not there.
+            if typed > 0.0 || !field.dragged() {
+                *end = typed;
+            }
             field.labelled_by(label.id).on_hover_text(RANGE);
         }
-        // Nothing ends there.
         *end = end.filter(|&end| end > 0.0);
     });
 }

@@ -5,8 +5,6 @@ use std::collections::btree_map::Entry;
 
 use eframe::egui;
 use egui::{Key, KeyboardShortcut, Modifiers};
-use sunfleck::ppm::Params;
-use sunfleck::scene::settings::Count;
 
 use super::app::Viewer;
 use super::files;
@@ -60,8 +58,8 @@ pub const SHORTCUTS: &[Shortcut] = &[
     key(Key::Space, "restart", |_, v| v.restart()),
     key(Key::P, "pause, go on", |_, v| v.wanted.paused = !v.wanted.paused),
     key(Key::N, "one iteration, then pause", |_, v| v.step()),
-    key(Key::Plus, "twice the photons an iteration", |ui, v| scale_photons(ui, v, 2.0)),
-    key(Key::Minus, "half the photons an iteration", |ui, v| scale_photons(ui, v, 0.5)),
+    key(Key::Plus, "twice the photons an iteration", |ui, v| v.scale_photons(ui, 2.0)),
+    key(Key::Minus, "half the photons an iteration", |ui, v| v.scale_photons(ui, 0.5)),
     key(Key::F, "frame all", |ui, v| v.frame_all(ui.input(|i| i.time))),
     key(Key::Num1, "picture as large as the window", |_, v| v.picture.fit()),
     key(Key::Num2, "one pixel to a pixel of the screen", |_, v| v.picture.zoom = Some(1.0)),
@@ -80,17 +78,11 @@ pub const SHORTCUTS: &[Shortcut] = &[
 /// A line around what has the keys, which egui itself hardly marks; a field that is typed into has a cursor.
 pub fn mark_focus(ctx: &egui::Context) {
     let focused = ctx.memory(|memory| memory.focused()).and_then(|id| ctx.read_response(id));
-    let Some(response) = focused.filter(|_| !ctx.text_edit_focused()) else { return };
+    let is_seen = |response: &egui::Response| response.interact_rect.is_positive() && !ctx.text_edit_focused();
+    let Some(response) = focused.filter(is_seen) else { return };
     let stroke = egui::Stroke::new(1.5, ctx.global_style().visuals.selection.stroke.color);
     let rect = response.interact_rect.expand(1.0);
     ctx.layer_painter(response.layer_id).rect_stroke(rect, 3.0, stroke, egui::StrokeKind::Outside);
-}
-
-fn scale_photons(ui: &egui::Ui, viewer: &mut Viewer, factor: f64) {
-    viewer.edit(ui, "photons", |settings| {
-        let now = settings.photons.map_or(Params::new(1, 1).n_paths, |n| n.0);
-        settings.photons = Some(Count((factor * f64::from(now)).max(1.0) as u32));
-    });
 }
 
 /// A key that is down.
@@ -188,8 +180,8 @@ pub fn handle(ui: &mut egui::Ui, viewer: &mut Viewer) {
         let n_presses = match keys.logical_key {
             Key::Questionmark => ui.input(|i| i.num_presses(Key::Questionmark)),
             Key::Escape if !escapes => 0,
-            // Presses the button that has the focus.
-            Key::Space if has_focus => 0,
+            // Presses the button that has the focus, or is meant for what is open.
+            Key::Space if has_focus || egui::Popup::is_any_open(ui.ctx()) => 0,
             key => ui.input_mut(|i| i.count_and_consume_key(keys.modifiers, key)),
         };
         // A frame may take longer than two presses.

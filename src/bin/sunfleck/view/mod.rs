@@ -17,7 +17,7 @@ mod help;
 mod inspect;
 mod keys;
 pub mod measure;
-mod memory;
+pub mod memory;
 mod messages;
 mod offscreen;
 mod picture;

@@ -38,6 +38,13 @@ impl Edits {
         }
         let before = std::mem::replace(&mut self.now, Arc::new(settings));
         let goes_on = self.last.is_some_and(|(last, when)| last == what && time - when < Self::ONE_STEP);
+        if goes_on && self.undo.last() == Some(&self.now) {
+            // Back where it began: no step at all.
+            self.undo.pop();
+            self.redo.clear();
+            self.last = None;
+            return;
+        }
         if !goes_on {
             self.undo.push(before);
             if self.undo.len() > MOST_UNDONE {
@@ -151,7 +158,13 @@ mod tests {
         edits.undo();
         assert_eq!(edits.now().alpha, Some(0.1));
         assert!(!edits.can_undo() && edits.can_redo());
+        // Back where it began, it is none.
+        edits.set("alpha", 15.0, with_alpha(0.2));
+        edits.set("alpha", 15.1, with_alpha(0.1));
+        assert!(!edits.can_undo() && !edits.can_redo());
+        edits.set("alpha", 15.2, with_alpha(0.29));
         edits.undo();
+        assert_eq!((edits.now().alpha, edits.can_undo()), (Some(0.1), false));
         edits.redo();
         assert_eq!(edits.now().alpha, Some(0.29));
         edits.set("alpha", 20.0, with_alpha(0.5));

@@ -284,7 +284,8 @@ struct ReferenceImage {
 
 impl Painter {
     pub fn is_empty(&self) -> bool {
-        self.hits.is_none() && self.reference.is_none() && self.halves.1 == Halves::default()
+        let keeps_none = self.hits.is_none() && self.reference.is_none() && self.exposure.is_none();
+        keeps_none && self.halves.1 == Halves::default()
     }
 
     /// Error estimated from the halves, and measured against the reference, or why it cannot be.

@@ -110,9 +110,10 @@ fn which(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene) {
         })
     });
     if let Some(i) = picked {
-        let camera = chosen(scene, i);
+        // The first is taken without a word.
+        let camera = (i > 0 || read.camera.is_some()).then(|| chosen(scene, i));
         viewer.edits.end_step();
-        viewer.edit(ui, "which camera", |s| s.camera = Some(camera));
+        viewer.edit(ui, "which camera", |s| s.camera = camera);
     }
     if reset {
         viewer.reset(ui, |s| s.camera = read.camera.clone());

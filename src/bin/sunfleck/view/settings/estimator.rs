@@ -72,7 +72,6 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     let now = &*viewer.settings();
     let defaults = Params::new(1, 1);
 
-    let said = Said { now: now.photons, read: read.photons, default: Count(defaults.n_paths) };
     let photons = |ui: &mut Ui, photons: &mut Count| {
         let mut n = f64::from(photons.0);
         let response = log_slider(ui, &mut n, Number::Count, 1e3..=2e7);
@@ -82,7 +81,7 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
         }
         response
     };
-    setting(ui, viewer, PHOTONS, said, photons, |s, photons| s.photons = photons);
+    setting(ui, viewer, PHOTONS, photons_of(now, read), photons, |s, photons| s.photons = photons);
 
     let said = Said { now: now.alpha, read: read.alpha, default: defaults.alpha };
     let alpha = |ui: &mut Ui, alpha: &mut f32| {
@@ -104,6 +103,20 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     pick(ui, viewer, INDEX, indices, [now.index, read.index], |s, index| s.index = index);
     let accelerators = if viewer.engine().backend() == "cpu" { &ACCELERATORS[..] } else { &ACCELERATORS[..1] };
     pick(ui, viewer, ACCELERATOR, accelerators, [now.accel, read.accel], |s, accel| s.accel = accel);
+}
+
+fn photons_of(now: &Settings, read: &Settings) -> Said<Count> {
+    Said { now: now.photons, read: read.photons, default: Count(Params::new(1, 1).n_paths) }
+}
+
+impl Viewer {
+    /// Photons emitted an iteration, times a factor.
+    pub fn scale_photons(&mut self, ui: &Ui, factor: f64) {
+        let Some(opened) = self.opened().cloned() else { return };
+        let said = photons_of(&self.settings(), &opened.read);
+        let photons = said.saying(Count((factor * f64::from(said.value().0)).max(1.0) as u32));
+        self.edit(ui, PHOTONS.name, |s| s.photons = photons);
+    }
 }
 
 /// One of a list, the default first: also what is shown if it is none of them, as the file of another device may ask.

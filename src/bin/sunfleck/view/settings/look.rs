@@ -33,16 +33,33 @@ const PRESETS: [([u32; 2], &str); 8] = [
     ([2048, 1024], "2048 × 1024"),
 ];
 
+/// What they do.
+const TONES: [(ToneMap, &str, &str); 3] = [
+    (ToneMap::Neutral, "PBR Neutral", "Khronos PBR Neutral: colours stay as they are, highlights are compressed."),
+    (ToneMap::Agx, "AgX", "Film-like: bright saturated colours fade to white."),
+    (ToneMap::Srgb, "sRGB", "None: what is too bright is cut off."),
+];
+
 pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     size(ui, viewer, read);
     exposure(ui, viewer, read);
-    let tones = [
-        (ToneMap::Neutral, "PBR Neutral", "Khronos PBR Neutral: colours stay as they are, highlights are compressed."),
-        (ToneMap::Agx, "AgX", "Film-like: bright saturated colours fade to white."),
-        (ToneMap::Srgb, "sRGB", "None: what is too bright is cut off."),
-    ];
-    let said = Said { now: viewer.settings().tonemap, read: read.tonemap, default: ToneMap::default() };
-    setting(ui, viewer, TONE, said, |ui, tone| choice(ui, "tone", tone, &tones), |s, tone| s.tonemap = tone);
+    let said = tone_of(&viewer.settings(), read);
+    setting(ui, viewer, TONE, said, |ui, tone| choice(ui, "tone", tone, &TONES), |s, tone| s.tonemap = tone);
+}
+
+fn tone_of(now: &Settings, read: &Settings) -> Said<ToneMap> {
+    Said { now: now.tonemap, read: read.tonemap, default: ToneMap::default() }
+}
+
+impl Viewer {
+    /// The next of the tone curves, after the last the first.
+    pub fn next_tone(&mut self, ui: &Ui) {
+        let Some(opened) = self.opened().cloned() else { return };
+        let said = tone_of(&self.settings(), &opened.read);
+        let at = TONES.iter().position(|(tone, ..)| *tone == said.value()).map_or(0, |at| at + 1);
+        let next = said.saying(TONES[at % TONES.len()].0);
+        self.show_otherwise(ui, TONE.name, |s| s.tonemap = next);
+    }
 }
 
 fn size(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {

@@ -72,7 +72,7 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
         return;
     };
     match scene.materials.get(index) {
-        Some(material) => properties(ui, viewer, read, scene, index, material),
+        Some(_) => properties(ui, viewer, read, scene, index),
         None => {
             ui.weak("The settings file makes this sphere, with a [[sphere]] that says what it is of.");
         }
@@ -111,9 +111,10 @@ fn idle(own: &Material, now: &MaterialSettings) -> [Option<&'static str>; 4] {
     [dull.filter(|_| metallic == 0.0), metal, metal.or(clear), metal.or(dull)]
 }
 
-fn properties(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, index: usize, own: &Material) {
+fn properties(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, index: usize) {
     let was = read.clone().material_mut(scene, index).clone();
     let before = viewer.settings().as_ref().clone().material_mut(scene, index).clone();
+    let own = &viewer.settings().material_without(scene, index);
     let color_row = |ui: &mut Ui, viewer: &mut Viewer, name: Name, field: ColorField, own: Vec3, most: f32| {
         let [now, read_so] = [&before, &was].map(|settings| *field(&mut settings.clone()));
         let said = Said { now, read: read_so, default: own.to_array() };

@@ -181,7 +181,7 @@ pub fn lights(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
 
 /// One line: on, colour, strength.
 fn light(ui: &mut Ui, viewer: &mut Viewer, read: &Settings, scene: &Scene, i: usize) {
-    let light = &scene.lights[i];
+    let light = &viewer.settings().scene_light_without(scene, i);
     let was = read.clone().scene_light_mut(scene, i).clone();
     let mut now = viewer.settings().as_ref().clone().scene_light_mut(scene, i).clone();
     let before = now.clone();

@@ -111,16 +111,21 @@ fn close_on_choice(ui: &mut Ui, items: impl FnOnce(&mut Ui)) {
     }
 }
 
-/// What was opened by keyboard has the keys again when it closes, however it does, unless the mouse was used meanwhile: they
-/// are no shortcuts then.
+/// What was opened by keyboard has the keys again when it closes, however it does: they are no shortcuts then. Not if the mouse
+/// was used meanwhile, or something else has got them.
 pub fn keep_keys(ui: &Ui, opener: &Response, is_open: bool) {
     let id = opener.id.with("has the keys");
-    let before = ui.data_mut(|data| data.remove_temp::<bool>(id));
+    let pass = ui.ctx().cumulative_pass_nr();
+    // A panel that was hidden while a list was open has none to close.
+    let noted = ui.data_mut(|data| data.remove_temp::<(u64, bool)>(id)).filter(|(last, _)| last + 1 == pass);
     let is_clicked = ui.input(|i| i.pointer.any_pressed() || i.pointer.any_released());
-    let has_keys = !is_clicked && before.unwrap_or_else(|| opener.has_focus());
+    let focused = ui.memory(|memory| memory.focused()).and_then(|id| ui.ctx().read_response(id));
+    let is_elsewhere = focused.is_some_and(|other| other.layer_id == opener.layer_id && other.id != opener.id);
+    let had_keys = noted.map_or_else(|| opener.has_focus(), |(_, had_keys)| had_keys);
+    let has_keys = had_keys && !is_clicked && !is_elsewhere;
     if is_open {
-        ui.data_mut(|data| data.insert_temp(id, has_keys));
-    } else if before.is_some() && has_keys {
+        ui.data_mut(|data| data.insert_temp(id, (pass, has_keys)));
+    } else if noted.is_some() && has_keys && !egui::Popup::is_any_open(ui.ctx()) {
         opener.request_focus();
     }
 }

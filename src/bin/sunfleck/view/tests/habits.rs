@@ -495,6 +495,31 @@ fn what_opens_by_keyboard_keeps_the_keys() {
     let expected = (Some(ToneMap::Agx), Some(Count(500)), Some(Size([640, 360])));
     assert_eq!((now.tonemap, now.photons, now.size), expected);
     assert_eq!(window.viewer().wanted.restarts, 0);
+    // Something else has got them by Tab, and opens.
+    let lists = ["Kernel", "Direct light"].map(|label| {
+        window.harness.get_by_role_and_label(Role::ComboBox, label).focus();
+        window.steps(2);
+        focused(&window)
+    });
+    window.harness.get_by_role_and_label(Role::ComboBox, "Kernel").focus();
+    window.steps(2);
+    window.press(Modifiers::NONE, Key::Space);
+    window.steps(3);
+    for _ in 0..9 {
+        if focused(&window) != lists[1] {
+            window.press(Modifiers::NONE, Key::Tab);
+            window.steps(2);
+        }
+    }
+    window.press(Modifiers::NONE, Key::Space);
+    window.steps(4);
+    assert_eq!(focused(&window), lists[1]);
+    // They go with what was open, and do not come back with it.
+    window.press(Modifiers::NONE, Key::F1);
+    window.steps(4);
+    window.press(Modifiers::NONE, Key::F1);
+    window.steps(4);
+    assert_eq!((egui::Popup::is_any_open(&window.harness.ctx), focused(&window)), (false, None));
     // By the mouse, nothing has them.
     window.press(Modifiers::NONE, Key::Escape);
     window.harness.get_by_role_and_label(Role::ComboBox, "Kernel").click();
