@@ -233,7 +233,7 @@ fn several_changes_of_one_thing_become_one() {
     let without = settings.scene_light_without(&scene, 1);
     assert_eq!(without.intensity, scene.lights[1].intensity);
     let mut twins = scene.clone();
-    twins.lights[0].name.clone_from(&twins.lights[1].name);
+    twins.lights[0].name = scene.lights[1].name.clone();
     let text = "[[scene_light]]\nname = \"sun\"\ncolor = [1, 0, 0]\n[[scene_light]]\nindex = 1\ncolor = [0, 1, 0]\n";
     let red = parse(text).scene_light_without(&twins, 1).intensity;
     assert!(red.x > 0.0 && red.y == 0.0, "{red}");
