@@ -14,7 +14,7 @@ use sunfleck::ppm::film::luminance;
 use super::app::Viewer;
 use super::charts::{bar, bars, bounces, rgb, rgba, short};
 use super::engine::{Comparison, Legend, Message, NOTHING, Painted, Values, View};
-use super::settings::widgets::list;
+use super::settings::widgets::{list, scrolling};
 use crate::progress::{decimals, length};
 
 /// Of what there is nothing to say about.
@@ -58,7 +58,7 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
     // Beside what is in it, not over it.
     let scroll = &mut ui.spacing_mut().scroll;
     scroll.floating_allocated_width = scroll.bar_width;
-    egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+    scrolling(ui, |ui| {
         section(ui, "View", |ui| view(ui, viewer, painted));
         section(ui, "Under the cursor", |ui| cursor(ui, viewer, painted));
         section(ui, "Whole picture", |ui| whole(ui, viewer, painted));

@@ -12,6 +12,7 @@ use sunfleck::scene::shipped::NAMES;
 use super::app::Viewer;
 use super::engine::Wake;
 use super::files;
+use super::settings::widgets::scrolling;
 use crate::scenes::describe;
 
 /// Of all that is shown, points.
@@ -120,7 +121,7 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer) {
         viewer.start.thumbnails = NAMES.iter().map(load).collect();
     }
     ui.painter().rect_filled(ui.max_rect(), 0.0, ui.visuals().panel_fill);
-    egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+    scrolling(ui, |ui| {
         let width = (ui.available_width() - 48.0).clamp(200.0, MOST_WIDTH);
         let margin = ((ui.available_width() - width) / 2.0).max(8.0);
         ui.horizontal_top(|ui| {

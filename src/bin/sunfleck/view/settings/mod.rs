@@ -16,7 +16,7 @@ use egui::{Response, Ui};
 use sunfleck::scene::settings::Settings;
 
 use super::app::Viewer;
-use widgets::{Name, row};
+use widgets::{Name, row, scrolling};
 
 type Group = fn(&mut Ui, &mut Viewer, &Settings);
 
@@ -50,7 +50,7 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer) {
     // Beside the ways back, not over them.
     let scroll = &mut ui.spacing_mut().scroll;
     scroll.floating_allocated_width = scroll.bar_width;
-    egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+    scrolling(ui, |ui| {
         for (title, hint, is_open, group) in GROUPS {
             let header = egui::CollapsingHeader::new(egui::RichText::new(title).strong()).default_open(is_open);
             let response = header.show_unindented(ui, |ui| group(ui, viewer, read));

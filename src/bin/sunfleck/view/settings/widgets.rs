@@ -129,3 +129,20 @@ pub fn keep_keys(ui: &Ui, opener: &Response, is_open: bool) {
         opener.request_focus();
     }
 }
+
+/// What is higher than its panel, scrolled to what gets the keys.
+pub fn scrolling(ui: &mut Ui, content: impl FnOnce(&mut Ui)) {
+    egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        content(ui);
+        let id = ui.scope_id().with("has the keys");
+        let focused = ui.memory(|memory| memory.focused());
+        let before =
+            ui.data_mut(|data| std::mem::replace(data.get_temp_mut_or_default::<Option<egui::Id>>(id), focused));
+        let new = focused.filter(|_| focused != before).and_then(|id| ui.ctx().read_response(id));
+        // Of another panel it is all to be seen.
+        let is_hidden = |one: &Response| one.interact_rect != one.rect && ui.min_rect().contains(one.rect.center());
+        if let Some(new) = new.filter(|new| new.layer_id == ui.layer_id() && is_hidden(new)) {
+            ui.scroll_to_rect(new.rect, None);
+        }
+    });
+}

@@ -530,6 +530,34 @@ fn what_opens_by_keyboard_keeps_the_keys() {
 }
 
 #[test]
+fn a_panel_shows_what_has_the_keys() {
+    let mut window = Window::with_picture();
+    window.viewer().selected = Some(0);
+    window.steps(2);
+    let sights = [(Role::SpinButton, "Metallic"), (Role::ComboBox, "Kernel"), (Role::Button, "Pin")];
+    let is_seen = |window: &Window, (role, label)| {
+        let rect = window.harness.get_by_role_and_label(role, label).rect();
+        rect.min.y > 30.0 && rect.max.y < 695.0
+    };
+    assert_eq!(sights.map(|sight| is_seen(&window, sight)), [false, true, false]);
+    for (role, label) in sights {
+        window.harness.get_by_role_and_label(role, label).focus();
+        // The panel glides there.
+        window.steps(40);
+        assert!(is_seen(&window, (role, label)), "{label}");
+    }
+    // It can be scrolled away.
+    window.harness.get_by_role_and_label(Role::ComboBox, "Kernel").focus();
+    window.steps(40);
+    window.harness.input_mut().events.push(Event::PointerMoved(egui::pos2(140.0, 400.0)));
+    let (unit, delta) = (egui::MouseWheelUnit::Point, egui::vec2(0.0, -900.0));
+    let (source, phase, modifiers) = (egui::MouseWheelSource::Wheel, egui::TouchPhase::Move, Modifiers::NONE);
+    window.harness.input_mut().events.push(Event::MouseWheel { unit, delta, source, phase, modifiers });
+    window.steps(40);
+    assert!(!is_seen(&window, sights[1]));
+}
+
+#[test]
 fn what_has_the_keys_is_marked() {
     let mut window = Window::with_picture();
     let marked = |window: &Window, rect: egui::Rect| {
