@@ -254,7 +254,7 @@ fn requests_that_cannot_be_met() {
         &["65535x65535", "memory"],
     );
     let many = sunfleck(folder.path(), words("render floor.gltf -o a.png -r 8x8 --photons 4000M --backend cpu"));
-    assert_error(&many, 1, &["4000000000 photon paths", "memory"]);
+    assert_error(&many, 1, &["4000000000 photons", "memory"]);
     assert_error(&render(folder.path(), "-o a.png --camera Below"), 1, &["Below", "0 \"Above\""]);
     assert_error(
         &sunfleck(folder.path(), words("render floor.gltf -o a.png --device no-such-gpu")),
