@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use sunfleck::cpu::CpuStages;
-use sunfleck::gpu::GpuStages;
+use sunfleck::gpu::{Context, GpuStages};
 use sunfleck::layout;
 use sunfleck::ppm::{Error, Params, Stages};
 use sunfleck::scene::{Camera, Environment, PackedScene, Scene};
@@ -120,15 +120,21 @@ fn replaced<S: Stages>(
     }
 }
 
+/// Words that are one more than the adapter binds, if a test can allocate so many.
+fn too_many_words(context: &Context) -> Option<u64> {
+    let n = context.most_bytes_bound() / 4 + 1;
+    if n > 1 << 27 {
+        println!("skipped: the adapter binds more than this test wants to allocate");
+        return None;
+    }
+    Some(n)
+}
+
 /// And what could not be set does no harm.
 #[test]
 fn a_scene_that_could_not_be_set_can_be_followed_by_another() {
     let Some(context) = context() else { return };
-    let n = context.most_bytes_bound() / 4 + 1;
-    if n > 1 << 27 {
-        println!("skipped: the adapter binds more than this test wants to allocate");
-        return;
-    }
+    let Some(n) = too_many_words(&context) else { return };
     let params = Params { n_paths: 4_000, ..Params::new(24, 16) };
     let scene = everything();
     let camera = scene.cameras[0].pack(24, 16);
@@ -173,11 +179,7 @@ fn a_dark_environment_takes_no_room() {
 #[test]
 fn textures_larger_than_a_binding_are_refused() {
     let Some(context) = context() else { return };
-    let n = context.most_bytes_bound() / 4 + 1;
-    if n > 1 << 27 {
-        println!("skipped: the adapter binds more than this test wants to allocate");
-        return;
-    }
+    let Some(n) = too_many_words(&context) else { return };
     let mut scene = PackedScene::new(&everything());
     scene.texels = vec![0; n as usize].into();
     match GpuStages::new(context, &scene, Default::default()) {

@@ -306,14 +306,9 @@ impl Viewer {
     /// Brightens the picture by so many stops.
     pub fn expose(&mut self, ui: &egui::Ui, stops: f32) {
         let now = self.look().exposure.or(self.now.painted.as_ref().map(|painted| painted.exposure));
-        self.show_otherwise(ui, "exposure", |s| {
+        self.edit(ui, "exposure", |s| {
             s.exposure = Some((now.unwrap_or(0.0) + stops).clamp(-MAX_EXPOSURE, MAX_EXPOSURE))
         });
-    }
-
-    /// Changes settings that only say how the picture is shown: nothing is rendered for it.
-    pub fn show_otherwise(&mut self, ui: &egui::Ui, what: &'static str, change: impl FnOnce(&mut Settings)) {
-        self.edit_at(ui.input(|i| i.time), what, change);
     }
 
     /// How the picture is shown.
@@ -473,7 +468,7 @@ impl Viewer {
         }
         super::help::show(ui, self);
         self.messages.show(ui);
-        super::keys::mark_focus(ui.ctx());
+        super::focus::mark(ui.ctx());
         self.wanted.painting.look = self.look();
         let asks_anew = self.editing.as_ref().is_some_and(|opened| is_asked_anew(opened, &wanted, &self.wanted));
         let (time, is_dragging) = ui.input(|i| (i.time, i.pointer.is_decidedly_dragging()));

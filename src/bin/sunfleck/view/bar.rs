@@ -9,7 +9,7 @@ use sunfleck::scene::settings::parse_count;
 use super::app::Viewer;
 use super::engine::{Limits, Phase, Snapshot};
 use super::files;
-use super::settings::widgets::{keep_keys, menu};
+use super::focus::{keep_keys, menu};
 use crate::progress;
 
 /// Room that the limits need, points; with less they are in a menu.

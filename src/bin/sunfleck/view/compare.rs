@@ -12,10 +12,11 @@ use super::app::Viewer;
 use super::charts::short;
 use super::engine::{Comparison, Message, Reference, View};
 use super::files;
+use super::focus::list;
 use super::inspect::{row, table};
 use super::keys::Keyboard;
 use super::settings::number::{Number, drag};
-use super::settings::widgets::{choice, list, within};
+use super::settings::widgets::{choice, within};
 
 /// What is said of the range of a difference.
 pub const RANGE: &str = "Where the colours of a difference end; what is above has the last of them, and what is not finite is \

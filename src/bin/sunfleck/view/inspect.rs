@@ -14,7 +14,7 @@ use sunfleck::ppm::film::luminance;
 use super::app::Viewer;
 use super::charts::{bar, bars, bounces, rgb, rgba, short};
 use super::engine::{Comparison, Legend, Message, NOTHING, Painted, Values, View};
-use super::settings::widgets::{list, scrolling};
+use super::focus::{list, scrolling};
 use crate::progress::{decimals, length};
 
 /// Of what there is nothing to say about.

@@ -52,7 +52,7 @@ pub const SHORTCUTS: &[Shortcut] = &[
     key(Key::V, "next view", |ui, v| v.next_view(ui, 1)),
     key(Key::G, "photons over the picture: by power, by bounce, none", |_, v| v.next_photons()),
     key(Key::E, "half a stop brighter", |ui, v| v.expose(ui, 0.5)),
-    key(Key::X, "automatic exposure", |ui, v| v.show_otherwise(ui, "exposure", |s| s.exposure = None)),
+    key(Key::X, "automatic exposure", |ui, v| v.edit(ui, "exposure", |s| s.exposure = None)),
     key(Key::T, "next tone curve", |ui, v| v.next_tone(ui)),
     key(Key::C, "next comparison with the reference", |ui, v| v.next_comparison(ui)),
     key(Key::Space, "restart", |_, v| v.restart()),
@@ -74,16 +74,6 @@ pub const SHORTCUTS: &[Shortcut] = &[
         false => v.selected = None,
     }),
 ];
-
-/// A line around what has the keys, which egui itself hardly marks; a field that is typed into has a cursor.
-pub fn mark_focus(ctx: &egui::Context) {
-    let focused = ctx.memory(|memory| memory.focused()).and_then(|id| ctx.read_response(id));
-    let is_seen = |response: &egui::Response| response.interact_rect.is_positive() && !ctx.text_edit_focused();
-    let Some(response) = focused.filter(is_seen) else { return };
-    let stroke = egui::Stroke::new(1.5, ctx.global_style().visuals.selection.stroke.color);
-    let rect = response.interact_rect.expand(1.0);
-    ctx.layer_painter(response.layer_id).rect_stroke(rect, 3.0, stroke, egui::StrokeKind::Outside);
-}
 
 /// A key that is down.
 struct Held {

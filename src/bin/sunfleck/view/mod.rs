@@ -13,6 +13,7 @@ mod engine;
 mod exit;
 mod failure;
 mod files;
+mod focus;
 mod help;
 mod inspect;
 mod keys;

@@ -12,7 +12,7 @@ use sunfleck::scene::shipped::NAMES;
 use super::app::Viewer;
 use super::engine::Wake;
 use super::files;
-use super::settings::widgets::scrolling;
+use super::focus::scrolling;
 use crate::scenes::describe;
 
 /// Of all that is shown, points.

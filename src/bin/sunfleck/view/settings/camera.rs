@@ -6,10 +6,11 @@ use sunfleck::scene::settings::{CameraSettings, Settings};
 use sunfleck::scene::{Camera, Projection, Scene};
 
 use super::number::{Number, drag_sized, metres, slider};
-use super::widgets::{Name, list, named, row};
+use super::widgets::{Name, named, row};
 use crate::progress::decimals;
 use crate::view::app::Viewer;
 use crate::view::engine::Message;
+use crate::view::focus::list;
 
 const CAMERA: Name = Name { name: "Camera", hint: "One of the scene's cameras. Restarts the estimate." };
 const POSITION: Name =

@@ -8,7 +8,8 @@ use egui::{
 };
 
 use super::number::{Number, drag_sized};
-use super::widgets::{keep_keys, named};
+use super::widgets::named;
+use crate::view::focus::keep_keys;
 
 /// Of what is in the window that opens, points.
 const WIDTH: f32 = 210.0;

@@ -6,9 +6,10 @@ use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::settings::{MAX_EXPOSURE, MAX_SIDE, Settings, Size};
 
 use super::number::{Number, slider, whole};
-use super::widgets::{Name, choice, menu, named, row};
+use super::widgets::{Name, choice, named, row};
 use super::{Said, setting};
 use crate::view::app::Viewer;
+use crate::view::focus::menu;
 
 const SIZE: Name = Name { name: "Size", hint: "Width and height of the picture, pixels. Restarts the estimate." };
 const EXPOSURE: Name = Name {
@@ -58,7 +59,7 @@ impl Viewer {
         let said = tone_of(&self.settings(), &opened.read);
         let at = TONES.iter().position(|(tone, ..)| *tone == said.value()).map_or(0, |at| at + 1);
         let next = said.saying(TONES[at % TONES.len()].0);
-        self.show_otherwise(ui, TONE.name, |s| s.tonemap = next);
+        self.edit(ui, TONE.name, |s| s.tonemap = next);
     }
 }
 
@@ -134,7 +135,7 @@ fn exposure(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
         response
     });
     if changed {
-        viewer.show_otherwise(ui, "exposure", |s| s.exposure = exposure);
+        viewer.edit(ui, "exposure", |s| s.exposure = exposure);
     }
     if reset {
         viewer.reset(ui, |s| s.exposure = read.exposure);

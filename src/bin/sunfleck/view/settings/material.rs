@@ -9,9 +9,10 @@ use sunfleck::scene::{Material, Scene};
 use super::color::color;
 use super::number::{Number, Scale};
 use super::scene::tidy;
-use super::widgets::{Name, list, row};
+use super::widgets::{Name, row};
 use super::{Said, setting};
 use crate::view::app::Viewer;
+use crate::view::focus::list;
 
 const MATERIAL: Name = Name { name: "Material", hint: "Click on a surface in the picture, or choose here." };
 const BASE_COLOR: Name =

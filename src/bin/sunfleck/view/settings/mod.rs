@@ -16,7 +16,8 @@ use egui::{Response, Ui};
 use sunfleck::scene::settings::Settings;
 
 use super::app::Viewer;
-use widgets::{Name, row, scrolling};
+use super::focus::scrolling;
+use widgets::{Name, row};
 
 type Group = fn(&mut Ui, &mut Viewer, &Settings);
 

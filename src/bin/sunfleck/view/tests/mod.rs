@@ -4,6 +4,7 @@ mod camera;
 mod compare;
 mod fields;
 mod files;
+mod focus;
 mod habits;
 mod panels;
 mod shortcuts;
