@@ -1,5 +1,6 @@
 //! The window: its state, and what is where in it.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -11,6 +12,7 @@ use sunfleck::output::display::Look;
 use sunfleck::scene::Camera;
 use sunfleck::scene::settings::{MAX_EXPOSURE, Settings};
 
+use super::dialog::{self, Dialog};
 use super::engine::{
     Choice, Engine, Limits, Message, Now, Opened, Phase, Save, Wake, Wanted, is_asked_anew, is_other_scene, is_same,
 };
@@ -133,12 +135,14 @@ pub struct Viewer {
     pub messages: Messages,
     pub show_help: bool,
     pub keyboard: super::keys::Keyboard,
-    pub dialog: Option<files::Dialog>,
+    pub dialog: Option<Dialog>,
+    /// What dialogs were answered with last.
+    pub picked: HashMap<dialog::Purpose, PathBuf>,
     pub screenshots: files::Screenshots,
     pub sky: Option<files::Sky>,
     /// To be read.
     reference: Option<PathBuf>,
-    pub pick: files::Pick,
+    pub pick: dialog::Pick,
     pub start: super::start::Page,
     wake: Wake,
     /// The scene that `edits` belongs to.
@@ -178,10 +182,11 @@ impl Viewer {
             show_help: false,
             keyboard: Default::default(),
             dialog: None,
+            picked: HashMap::new(),
             screenshots: Default::default(),
             sky: None,
             reference: first.reference,
-            pick: Arc::new(files::pick),
+            pick: dialog::system(rfd::FileDialog::new()),
             selected: None,
             had_popup: false,
             start: Default::default(),

@@ -1,9 +1,8 @@
-//! Files: dialogs, dropped files, the clipboard.
+//! Files: what is done with those that dialogs name or that are dropped; pictures of the window; the clipboard.
 
 use std::borrow::Cow;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::thread::JoinHandle;
 
@@ -13,40 +12,9 @@ use image::{ExtendedColorType, ImageEncoder};
 use sunfleck::scene::settings::EnvironmentSettings;
 
 use super::app::Viewer;
-use super::engine::{Choice, Message, Opened, catch, is_same};
+use super::dialog::{Answer, Dialog, Purpose, ask, with_extension, without_dialog};
+use super::engine::{Message, Opened, catch, is_same};
 use crate::cli::Usage;
-
-/// What a dialog was for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Purpose {
-    Open,
-    SavePicture,
-    SaveSettings,
-    Reference,
-    Environment,
-}
-
-/// What came of a dialog.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Answer {
-    File(PathBuf),
-    Cancelled,
-    /// The system has no dialogs: neither a desktop portal nor zenity.
-    NoDialog,
-}
-
-/// Asks for a file.
-pub type Pick = Arc<dyn Fn(Purpose, &str) -> Answer + Send + Sync>;
-
-/// A dialog under way, on a thread of its own.
-pub struct Dialog {
-    purpose: Purpose,
-    /// For a file that is saved, its extension left out.
-    name: String,
-    /// The scene that it was asked for.
-    scene: Option<Arc<Choice>>,
-    answer: mpsc::Receiver<Answer>,
-}
 
 /// An environment that is being read, for the scene that is open.
 pub struct Sky {
@@ -56,81 +24,8 @@ pub struct Sky {
     done: mpsc::Receiver<Result<(), String>>,
 }
 
-const SCENES: &[&str] = &["glb", "gltf", "obj", "toml"];
-
-/// The system's dialog, for a file that is best called `name`; waits for the answer.
-pub fn pick(purpose: Purpose, name: &str) -> Answer {
-    // Fails if there is a logger, which is then this one.
-    if log::set_logger(&DIALOG_FAULTS).is_ok() {
-        log::set_max_level(log::LevelFilter::Error);
-    }
-    DIALOG_FAULTS.0.store(false, Ordering::Relaxed);
-    let dialog = rfd::FileDialog::new();
-    let path = match purpose {
-        Purpose::Open => dialog.set_title("Open a scene").add_filter("Scenes and settings", SCENES).pick_file(),
-        Purpose::SavePicture => dialog
-            .set_title("Save the picture")
-            .set_file_name(format!("{name}.exr"))
-            .add_filter("OpenEXR, PNG", &["exr", "png"])
-            .save_file(),
-        Purpose::SaveSettings => dialog
-            .set_title("Save the settings")
-            .set_file_name(format!("{name}.toml"))
-            .add_filter("Settings", &["toml"])
-            .save_file(),
-        Purpose::Reference => dialog.set_title("Open a reference").add_filter("OpenEXR", &["exr"]).pick_file(),
-        Purpose::Environment => {
-            dialog.set_title("Open an environment").add_filter("Latitude-longitude maps", &["hdr", "exr"]).pick_file()
-        }
-    };
-    match path {
-        Some(path) => Answer::File(path),
-        None if DIALOG_FAULTS.0.load(Ordering::Relaxed) => Answer::NoDialog,
-        None => Answer::Cancelled,
-    }
-}
-
-/// Notes that there was no dialog: rfd gives no file then, as if it was cancelled, and only logs why. zenity is the last that
-/// it tries.
-struct DialogFaults(AtomicBool);
-
-static DIALOG_FAULTS: DialogFaults = DialogFaults(AtomicBool::new(false));
-
-impl log::Log for DialogFaults {
-    fn enabled(&self, metadata: &log::Metadata<'_>) -> bool {
-        metadata.level() == log::Level::Error && metadata.target().starts_with("rfd::")
-    }
-
-    fn log(&self, record: &log::Record<'_>) {
-        if self.enabled(record.metadata()) && record.args().to_string().contains("zenity") {
-            self.0.store(true, Ordering::Relaxed);
-        }
-    }
-
-    fn flush(&self) {}
-}
-
-fn ask(viewer: &mut Viewer, purpose: Purpose) {
-    if viewer.dialog.is_some() {
-        // Some systems never answer.
-        let text = "a file dialog is open already; sunfleck view SCENE -o FILE saves without one".to_owned();
-        return viewer.engine().speaker()(Message::Warning(text));
-    }
-    let (sender, answer) = mpsc::channel();
-    let stem = viewer
-        .wanted
-        .scene
-        .as_ref()
-        .map(|choice| Path::new(&choice.name).file_stem().unwrap_or_default().to_string_lossy().into_owned());
-    let name = stem.unwrap_or_else(|| "picture".to_owned());
-    let (wake, pick) = (viewer.wake(), Arc::clone(&viewer.pick));
-    let named = name.clone();
-    std::thread::spawn(move || {
-        let _ = sender.send(pick(purpose, &named));
-        wake();
-    });
-    viewer.dialog = Some(Dialog { purpose, name, scene: viewer.wanted.scene.clone(), answer });
-}
+/// What the names of scenes end in, settings among them.
+pub const SCENES: &[&str] = &["glb", "gltf", "obj", "toml"];
 
 /// Takes what dialogs and threads that read have come to.
 pub fn poll(ui: &egui::Ui, viewer: &mut Viewer) {
@@ -139,17 +34,17 @@ pub fn poll(ui: &egui::Ui, viewer: &mut Viewer) {
 }
 
 fn poll_dialog(ui: &egui::Ui, viewer: &mut Viewer) {
-    let Some(dialog) = &viewer.dialog else { return };
-    let answer = match dialog.answer.try_recv() {
-        Ok(answer) => answer,
-        Err(mpsc::TryRecvError::Empty) => return,
-        Err(mpsc::TryRecvError::Disconnected) => Answer::Cancelled,
-    };
-    let Some(Dialog { purpose, name, scene, .. }) = viewer.dialog.take() else { return };
+    let Some(answer) = viewer.dialog.as_ref().and_then(Dialog::answer) else { return };
+    let Some(Dialog { request, scene, .. }) = viewer.dialog.take() else { return };
+    let purpose = request.purpose;
     let path = match answer {
-        Answer::File(path) => path,
+        Answer::File(path) => {
+            let path = with_extension(path, purpose);
+            viewer.picked.insert(purpose, path.clone());
+            path
+        }
         Answer::Cancelled => return,
-        Answer::NoDialog => match without_dialog(purpose, &name) {
+        Answer::NoDialog => match without_dialog(&request) {
             Ok((path, why)) => {
                 viewer.say(ui, Message::Warning(why));
                 path
@@ -179,21 +74,6 @@ fn poll_dialog(ui: &egui::Ui, viewer: &mut Viewer) {
         Purpose::Reference => super::compare::load(ui, viewer, &path),
         Purpose::Environment => read_environment(ui, viewer, &path),
     }
-}
-
-/// Where a file goes that cannot be asked for, and what is told of it; what else can be done, if it is to be read.
-fn without_dialog(purpose: Purpose, name: &str) -> Result<(PathBuf, String), String> {
-    let no_dialog = "no file dialog: neither a desktop portal nor zenity answers";
-    let extension = match purpose {
-        Purpose::Open => return Err(format!("{no_dialog}; drop a scene on the window, or: sunfleck view SCENE")),
-        Purpose::Reference => return Err(format!("{no_dialog}; drop an .exr on the window, or use --reference")),
-        Purpose::Environment => return Err(format!("{no_dialog}; drop an .hdr on the window, or use --env")),
-        Purpose::SavePicture => "exr",
-        Purpose::SaveSettings => "toml",
-    };
-    let path = free_name(Path::new(""), name, extension);
-    let why = format!("{no_dialog}; {} goes to the working folder", path.display());
-    Ok((path, why))
 }
 
 pub fn open(viewer: &mut Viewer) {
@@ -312,6 +192,9 @@ pub fn dropped(ui: &egui::Ui, viewer: &mut Viewer, paths: &[PathBuf]) {
 
 /// The settings as the command line reads them.
 fn save_settings(ui: &egui::Ui, viewer: &mut Viewer, path: &Path) {
+    if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+        return viewer.say(ui, Message::Error(format!("{}: settings end in .toml", path.display())));
+    }
     let Some(text) = viewer.settings_text(path) else { return };
     let written = sunfleck::output::atomic::write(path, |writer| io::Write::write_all(writer, text.as_bytes()));
     let message = match written {
@@ -357,7 +240,7 @@ impl Screenshots {
                 if let Some(before) = before {
                     let _ = before.join();
                 }
-                let path = free_name(&folder, "sunfleck-window", "png");
+                let path = free_name(&folder.join("sunfleck-window.png"));
                 say(match write_png(&path, &image) {
                     Ok(()) => Message::Said(format!("saved {}", path.display())),
                     Err(error) => Message::Error(error.to_string()),
@@ -388,9 +271,10 @@ pub fn name_of(path: &Path) -> Cow<'_, str> {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy()
 }
 
-/// In `folder`, not there yet.
-pub fn free_name(folder: &Path, stem: &str, extension: &str) -> PathBuf {
-    let name = |i: u32| folder.join(format!("{stem}-{i}.{extension}"));
+/// `path` with a number before its extension, so that there is no such file yet.
+pub fn free_name(path: &Path) -> PathBuf {
+    let [stem, extension] = [path.file_stem(), path.extension()].map(|part| part.unwrap_or_default().to_string_lossy());
+    let name = |i: u32| path.with_file_name(format!("{stem}-{i}.{extension}"));
     (1..).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0))
 }
 
@@ -399,20 +283,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_a_dialog_pictures_are_written_beside_those_that_are_there() {
-        for (purpose, extension) in [(Purpose::SavePicture, "exr"), (Purpose::SaveSettings, "toml")] {
-            let (path, why) = without_dialog(purpose, "no such name").unwrap();
-            assert_eq!(path, PathBuf::from(format!("no such name-1.{extension}")));
-            assert!(why.contains("zenity") && why.contains("no such name-1"), "{why}");
-        }
+    fn a_free_name_has_the_first_number_that_is_not_taken() {
         let folder = tempfile::tempdir().unwrap();
-        let names = ["x-1.exr", "x-2.exr", "x-3.exr"].map(|name| folder.path().join(name));
-        for name in &names {
-            assert_eq!(free_name(folder.path(), "x", "exr"), *name);
+        for name in ["x.y-1.exr", "x.y-2.exr", "x.y-3.exr"].map(|name| folder.path().join(name)) {
+            assert_eq!(free_name(&folder.path().join("x.y.exr")), name);
             std::fs::write(name, "").unwrap();
-        }
-        for purpose in [Purpose::Open, Purpose::Reference] {
-            assert!(without_dialog(purpose, "x").unwrap_err().contains("drop"));
         }
     }
 
@@ -443,22 +318,5 @@ mod tests {
         let image = Arc::new(egui::ColorImage::filled([5, 3], egui::Color32::WHITE));
         nowhere.writer(folder.path().join("absent"), move |message| told.send(message).unwrap())(image);
         assert!(matches!(messages.recv().unwrap(), Message::Error(why) if why.contains("there is no folder")));
-    }
-
-    #[test]
-    fn only_the_last_resort_of_dialogs_is_a_fault() {
-        let faults = DialogFaults(AtomicBool::new(false));
-        for (target, text, is_fault) in [
-            ("wgpu::zenity", "Failed to pick file with zenity: x", false),
-            ("rfd::backend", "OpenFile failed: no portal", false),
-            ("rfd::backend", "Failed to pick file with zenity: x", true),
-        ] {
-            let record = |arguments: std::fmt::Arguments<'_>| {
-                let record = log::Record::builder().level(log::Level::Error).target(target).args(arguments).build();
-                log::Log::log(&faults, &record);
-            };
-            record(format_args!("{text}"));
-            assert_eq!(faults.0.load(Ordering::Relaxed), is_fault, "{target}: {text}");
-        }
     }
 }

@@ -9,6 +9,7 @@ mod camera;
 mod charts;
 mod compare;
 mod convergence;
+mod dialog;
 mod engine;
 mod exit;
 mod failure;

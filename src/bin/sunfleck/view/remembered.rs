@@ -189,7 +189,7 @@ impl<S: Fn(Message)> Kept<S> {
     /// Keeps a file that is none of this program's under another name.
     fn put_aside(&self, why: &io::Error) -> Result<(), String> {
         let path = self.path.display();
-        let aside = free_name(self.path.parent().unwrap_or(Path::new("")), &name_of(&self.path), "bad");
+        let aside = free_name(&self.path.with_added_extension("bad"));
         fs::rename(&self.path, &aside).map_err(|error| format!("{path}: {error}"))?;
         let text = format!("{path} cannot be read: {why}; it is now {}", name_of(&aside));
         (self.say)(Message::Warning(text));

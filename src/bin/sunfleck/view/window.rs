@@ -1,7 +1,7 @@
 //! The window of the system, and what may befall it.
 
 use std::panic::AssertUnwindSafe;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use std::{panic, thread};
@@ -10,6 +10,7 @@ use anyhow::{Result, anyhow};
 use eframe::{egui, wgpu};
 
 use super::app::{LastSave, Viewer};
+use super::dialog;
 use super::engine::{Message, Save, Wake, panic_text};
 use super::exit;
 use super::files::free_name;
@@ -135,6 +136,7 @@ pub fn run(
                         fault.watch(&state.device, move || context.request_repaint());
                     }
                     viewer.enter(creation.storage, place);
+                    viewer.pick = dialog::system(rfd::FileDialog::new().set_parent(creation));
                     Ok(Box::new(Window { viewer, guest, n_frames, fault: fault.clone() }))
                 }),
             )
@@ -214,7 +216,7 @@ fn beside(path: PathBuf) -> PathBuf {
         return path;
     }
     let [stem, extension] = [path.file_stem(), path.extension()].map(|part| part.unwrap_or_default().to_string_lossy());
-    free_name(path.parent().unwrap_or(Path::new("")), &format!("{stem}-rescued"), &extension)
+    free_name(&path.with_file_name(format!("{stem}-rescued.{extension}")))
 }
 
 fn with_picture(why: anyhow::Error, saved: Option<PathBuf>) -> anyhow::Error {

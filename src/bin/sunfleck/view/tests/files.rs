@@ -1,7 +1,6 @@
-//! Files that come from outside, dialogs that are not there, and the picture on the screen.
+//! Files that come from outside, and the picture on the screen.
 
 use std::path::Path;
-use std::sync::Arc;
 
 use eframe::egui;
 use egui::{Key, Modifiers};
@@ -11,7 +10,6 @@ use sunfleck::scene::export::write_environment_hdr;
 
 use super::Window;
 use crate::view::app::Viewer;
-use crate::view::files::Answer;
 
 const QUAD: &str = "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nf 4 3 2 1\n";
 
@@ -144,26 +142,6 @@ fn an_environment_lights_the_scene_that_is_open() {
     window.drop_files([dropped.clone(), scene]);
     window.wait("scene and environment", |viewer| environment(viewer) == Some(&dropped));
     assert_eq!(mean(&mut window), lit);
-}
-
-#[test]
-fn without_dialogs_it_is_said_what_else_there_is() {
-    let mut window = Window::new(None);
-    window.viewer().pick = Arc::new(|_, _| Answer::NoDialog);
-    window.press(Modifiers::COMMAND, Key::O);
-    window.wait_for_message("no file dialog");
-    assert!(window.viewer().dialog.is_none());
-}
-
-#[test]
-fn a_picture_is_saved_under_no_other_name() {
-    let mut window = Window::with_picture();
-    let wrong = window.path("picture.jpg");
-    let asked = wrong.clone();
-    window.viewer().pick = Arc::new(move |_, _| Answer::File(asked.clone()));
-    window.press(Modifiers::COMMAND, Key::S);
-    window.wait_for_message("picture.jpg: a picture ends in .exr or .png");
-    assert!(window.viewer().saved_as.is_empty() && !wrong.exists());
 }
 
 #[test]

@@ -11,8 +11,8 @@ use sunfleck::scene::settings::Count;
 
 use super::{NoPixels, Window};
 use crate::view::app::Place;
+use crate::view::dialog::Answer;
 use crate::view::engine::{Comparison, Limits, Phase, View, is_same};
-use crate::view::files::Answer;
 
 /// A press or a release of a key that has another name with Shift.
 fn key(key: Key, physical: Key, pressed: bool, modifiers: Modifiers) -> [Event; 2] {
@@ -21,7 +21,7 @@ fn key(key: Key, physical: Key, pressed: bool, modifiers: Modifiers) -> [Event; 
 }
 
 /// A scene in a file of its own.
-fn with_file(text: &str) -> (Window, std::path::PathBuf) {
+pub fn with_file(text: &str) -> (Window, std::path::PathBuf) {
     let mut window = Window::new(None);
     let file = window.path("own.toml");
     std::fs::write(&file, text).unwrap();
@@ -30,7 +30,7 @@ fn with_file(text: &str) -> (Window, std::path::PathBuf) {
     (window, file)
 }
 
-const OWN: &str = "scene = \"cornell\"\nsize = [16, 12]\nphotons = 200\nalpha = 0.6\n";
+pub const OWN: &str = "scene = \"cornell\"\nsize = [16, 12]\nphotons = 200\nalpha = 0.6\n";
 
 /// A warning that has passed does not come back with every change.
 #[test]
@@ -267,7 +267,7 @@ fn a_picture_is_not_saved_over_that_of_another_scene() {
 fn each_scene_keeps_the_name_of_its_picture() {
     let (mut window, file) = with_file(OWN);
     let folder = window.path("");
-    window.viewer().pick = std::sync::Arc::new(move |_, name| Answer::File(folder.join(format!("{name}.exr"))));
+    window.viewer().pick = std::sync::Arc::new(move |request| Answer::File(folder.join(&request.name)));
     let save = |window: &mut Window, name: &str| {
         let path = window.path(name);
         let _ = std::fs::remove_file(&path);
@@ -283,7 +283,7 @@ fn each_scene_keeps_the_name_of_its_picture() {
     window.wait_for_picture();
     save(&mut window, "glass.exr");
     // Without asking, by whatever path it is opened.
-    window.viewer().pick = std::sync::Arc::new(|_, _| panic!("asked"));
+    window.viewer().pick = std::sync::Arc::new(|_| panic!("asked"));
     let folder = file.parent().unwrap();
     for file in [file.clone(), folder.join(".").join("own.toml")] {
         window.viewer().open(file.to_string_lossy());

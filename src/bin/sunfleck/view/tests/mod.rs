@@ -2,6 +2,7 @@
 
 mod camera;
 mod compare;
+mod dialogs;
 mod fields;
 mod files;
 mod focus;
@@ -22,8 +23,8 @@ use sunfleck::layout::Camera;
 use tempfile::TempDir;
 
 use super::app::{First, Viewer};
+use super::dialog::{Answer, Purpose, Request};
 use super::engine::{Choice, Engine, Limits, Phase};
-use super::files::{Answer, Purpose};
 use crate::devices::Device;
 
 /// For anything that is waited for.
@@ -79,9 +80,9 @@ impl Window {
         viewer.preview_from = f64::INFINITY;
         let asked = Arc::new(Mutex::new(vec![]));
         let (noted, place) = (Arc::clone(&asked), folder.path().to_owned());
-        viewer.pick = Arc::new(move |purpose, _| {
-            noted.lock().unwrap().push(purpose);
-            Answer::File(place.join(file_of(purpose)))
+        viewer.pick = Arc::new(move |request: &Request| {
+            noted.lock().unwrap().push(request.purpose);
+            Answer::File(place.join(file_of(request.purpose)))
         });
         let harness = Harness::builder()
             .with_size([1280.0, 720.0])

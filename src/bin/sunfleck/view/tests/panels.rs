@@ -14,8 +14,8 @@ use sunfleck::scene::shipped::NAMES;
 use super::{Window, engine};
 use crate::cli::{Cli, Command};
 use crate::view::app::{First, Viewer};
+use crate::view::dialog::Purpose;
 use crate::view::engine::{Choice, Comparison, NOTHING, Phase, View};
-use crate::view::files::Purpose;
 use crate::view::keys::SHORTCUTS;
 
 #[test]

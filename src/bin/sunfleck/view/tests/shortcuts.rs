@@ -7,8 +7,8 @@ use sunfleck::output::tonemap::ToneMap;
 use sunfleck::scene::settings::Settings;
 
 use super::{ITERATIONS, Window};
+use crate::view::dialog::Purpose;
 use crate::view::engine::{Choice, Phase, Wanted};
-use crate::view::files::Purpose;
 use crate::view::keys::SHORTCUTS;
 use crate::view::remembered::Remembered;
 
