@@ -175,6 +175,18 @@ fn check_limits(info: &DeviceInfo, limits: &wgpu::Limits, buffers: u32) -> Resul
     })
 }
 
+/// The first that is right, else the first error; nothing of nothing.
+fn first_or_first_error<T, E>(results: impl IntoIterator<Item = Result<T, E>>) -> Option<Result<T, E>> {
+    let mut error = None;
+    for result in results {
+        match result {
+            Ok(value) => return Some(Ok(value)),
+            Err(why) => _ = error.get_or_insert(why),
+        }
+    }
+    error.map(Err)
+}
+
 const TIMESTAMPS: wgpu::Features =
     wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
 
@@ -230,17 +242,23 @@ impl Context {
             Choice::Index(index) => info.index == *index,
             Choice::Name(part) => info.name.to_lowercase().contains(&part.to_lowercase()),
         };
-        let Some((info, adapter)) = found.into_iter().find(|(info, _)| wanted(info)) else {
-            return Err(Error::NoDevice(match choice {
+        found.retain(|(info, _)| wanted(info));
+        let is_real = found.first().map(|(info, _)| info.is_real());
+        // A card may be there twice, by several drivers. What is no hardware does not stand in for it.
+        let opened = found
+            .into_iter()
+            .take_while(|(info, _)| Some(info.is_real()) == is_real)
+            .map(|(info, adapter)| Self::open(info, &adapter, ray_queries));
+        first_or_first_error(opened).unwrap_or_else(|| {
+            Err(Error::NoDevice(match choice {
                 Choice::Real => format!("no hardware GPU{kind}; {}", list()),
                 Choice::Any => {
                     "no GPU adapter: no driver, or none with compute shaders (--backend cpu needs none)".to_owned()
                 }
                 Choice::Index(index) => format!("no GPU adapter {index}{kind}; {}", list()),
                 Choice::Name(part) => format!("no GPU adapter named \"{part}\"{kind}; {}", list()),
-            }));
-        };
-        Self::open(info, &adapter, ray_queries)
+            }))
+        })
     }
 
     fn open(info: DeviceInfo, adapter: &wgpu::Adapter, ray_queries: bool) -> Result<Self, Error> {
@@ -505,4 +523,17 @@ fn software_budget() -> u64 {
         line.split_whitespace().nth(1)?.parse::<u64>().ok()
     });
     available.map_or(4 << 30, |kib| kib * 1024 / 2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_next_adapter_is_tried_and_the_first_error_told() {
+        let first = |results: &[Result<u32, &'static str>]| first_or_first_error(results.iter().copied());
+        assert_eq!(first(&[Err("a"), Ok(2), Ok(3)]), Some(Ok(2)));
+        assert_eq!(first(&[Err("a"), Err("b")]), Some(Err("a")));
+        assert_eq!(first(&[]), None);
+    }
 }

@@ -8,7 +8,7 @@ mod settings;
 use std::f32::consts::FRAC_1_SQRT_2;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Output, Stdio};
+use std::process::Output;
 use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
@@ -416,7 +416,7 @@ fn an_interrupted_render_is_saved() {
         let child = std::process::Command::new(PROGRAM)
             .current_dir(folder.path())
             .args(words(&format!("{args} --save-every 0.01")))
-            .stderr(Stdio::piped())
+            .stderr(std::process::Stdio::piped())
             .spawn()
             .unwrap();
         // It renders once there is a picture.

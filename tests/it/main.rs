@@ -38,3 +38,10 @@ mod reference;
 mod sampling;
 #[cfg(all(feature = "view", target_os = "linux"))]
 mod viewer;
+
+/// What the system says of a file that is not there, without its number.
+#[cfg(feature = "mesh")]
+fn not_found() -> String {
+    let text = std::fs::File::open("no such file").unwrap_err().to_string();
+    text.split(" (os error").next().unwrap().to_owned()
+}

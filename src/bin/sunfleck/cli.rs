@@ -62,7 +62,7 @@ Keys and mouse: press ? in the window.";
 
 /// Renders scenes by progressive photon mapping: caustics through glass and water converge.
 #[derive(Debug, Parser)]
-#[command(name = "sunfleck", version = VERSION, after_help = EXAMPLES, max_term_width = 110)]
+#[command(name = "sunfleck", bin_name = "sunfleck", version = VERSION, after_help = EXAMPLES, max_term_width = 110)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -435,7 +435,7 @@ mod tests {
             settings.camera,
             Some(CameraSettings { name, forward: Some([0.0, 0.0, 1.0]), ..Default::default() })
         );
-        let file = Some("/x\u{a0}y.hdr".to_owned());
+        let file = Some(crate::scenes::absolute(Path::new("/x\u{a0}y.hdr")).unwrap());
         assert_eq!(
             settings.environment,
             Some(EnvironmentSettings { file, rotation_degrees: Some(90.0), ..Default::default() })

@@ -311,8 +311,7 @@ mod tests {
         source.kept.lock().unwrap()[0].environment = sky(4.0);
         assert_eq!(texel(), 4.0);
         export::write_environment_hdr(&sky(2.0), &path).unwrap();
-        let file = std::fs::File::options().write(true).open(&path).unwrap();
-        file.set_modified(SystemTime::UNIX_EPOCH).unwrap();
+        std::fs::File::options().write(true).open(&path).unwrap().set_modified(SystemTime::UNIX_EPOCH).unwrap();
         assert_eq!(texel(), 2.0);
         std::fs::remove_file(&path).unwrap();
         assert!(source.environment(&path).is_err());

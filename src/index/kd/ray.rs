@@ -94,9 +94,9 @@ impl<T: Scalar> Ray<T> {
             return None;
         }
         let edges = [
-            difference_of_products(cx, by, cy, bx),
-            difference_of_products(ax, cy, ay, cx),
-            difference_of_products(bx, ay, by, ax),
+            T::difference_of_products(cx, by, cy, bx),
+            T::difference_of_products(ax, cy, ay, cx),
+            T::difference_of_products(bx, ay, by, ax),
         ];
         if mixed(edges) {
             return None;
@@ -117,13 +117,4 @@ impl<T: Scalar> Ray<T> {
 fn mixed<T: Scalar>(edges: [T; 3]) -> bool {
     let [u, v, w] = edges;
     (u < T::ZERO || v < T::ZERO || w < T::ZERO) && (u > T::ZERO || v > T::ZERO || w > T::ZERO)
-}
-
-/// a·b − c·d to within 1.5 units in the last place, unless it underflows. (Jeannerod, Louvet & Muller 2013, "Further
-/// analysis of Kahan's algorithm for the accurate computation of 2×2 determinants".)
-#[inline]
-fn difference_of_products<T: Scalar>(a: T, b: T, c: T, d: T) -> T {
-    let product = c * d;
-    let error = (-c).mul_add(d, product);
-    a.mul_add(b, -product) + error
 }

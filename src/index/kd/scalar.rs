@@ -37,8 +37,8 @@ pub trait Scalar:
     /// Coordinates and lengths are at most 2 to this power, and the size of a mesh at least its inverse: products of
     /// three neither overflow nor vanish.
     const EXPONENT: i32;
-    /// a·b + c, rounded once.
-    fn mul_add(self, b: Self, c: Self) -> Self;
+    /// a·b − c·d to within 1.5 units in the last place, unless it underflows.
+    fn difference_of_products(a: Self, b: Self, c: Self, d: Self) -> Self;
     /// Rounded.
     fn of(x: f64) -> Self;
 }
@@ -49,9 +49,12 @@ impl Scalar for f32 {
     const INFINITY: Self = f32::INFINITY;
     const EPSILON: f64 = f32::EPSILON as f64;
     const EXPONENT: i32 = 40;
+    /// In double precision, in which the products are exact: a processor that is told of no fused multiply-add has none
+    /// but a function of the C library, which not all of these round once.
     #[inline]
-    fn mul_add(self, b: Self, c: Self) -> Self {
-        self.mul_add(b, c)
+    fn difference_of_products(a: Self, b: Self, c: Self, d: Self) -> Self {
+        let [a, b, c, d] = [a, b, c, d].map(f64::from);
+        (a * b - c * d) as f32
     }
     #[inline]
     fn of(x: f64) -> Self {
@@ -65,9 +68,13 @@ impl Scalar for f64 {
     const INFINITY: Self = f64::INFINITY;
     const EPSILON: f64 = f64::EPSILON;
     const EXPONENT: i32 = 300;
+    /// Kahan's way. (Jeannerod, Louvet & Muller 2013, "Further analysis of Kahan's algorithm for the accurate computation
+    /// of 2×2 determinants".)
     #[inline]
-    fn mul_add(self, b: Self, c: Self) -> Self {
-        self.mul_add(b, c)
+    fn difference_of_products(a: Self, b: Self, c: Self, d: Self) -> Self {
+        let product = c * d;
+        let error = (-c).mul_add(d, product);
+        a.mul_add(b, -product) + error
     }
     #[inline]
     fn of(x: f64) -> Self {

@@ -11,7 +11,7 @@ use crate::scene::{AlphaMode, Image, Material, Sphere, Texture, Wrap, load};
 
 /// Equal up to the rounding of 32-bit floats.
 fn near(a: &[f32], b: &[f32]) -> bool {
-    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 2e-6 * a.abs().max(b.abs()).max(1e-3))
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 2e-6 * a.abs().max(b.abs()).max(1e-2))
 }
 
 fn flat<const N: usize>(values: impl IntoIterator<Item = [f32; N]>) -> Vec<f32> {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use super::{Folder, png};
+use crate::not_found;
 use glam::{Vec2, Vec3, Vec4};
 use sunfleck::ppm::Interrupt;
 use sunfleck::scene::AlphaMode;
@@ -77,7 +78,7 @@ fn material_libraries_are_read_with_care() {
         ("newmtl a\nillum 2.5\n", "scene.mtl:2: illum"),
         ("newmtl a\nKd -1 0 0\n", "negative"),
         ("newmtl a\nmap_Kd\n", "scene.mtl:2: map_Kd: no file"),
-        ("newmtl a\nmap_Kd none.png\n", "scene.mtl:2: none.png: No such file"),
+        ("newmtl a\nmap_Kd none.png\n", &*format!("scene.mtl:2: none.png: {}", not_found())),
         ("newmtl a\nmap_Kd ../x.png\n", "scene.mtl:2: ../x.png: lies outside"),
     ] {
         folder.write("scene.mtl", text);

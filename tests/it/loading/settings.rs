@@ -1,6 +1,7 @@
 //! Settings files.
 
 use super::{Folder, Glb};
+use crate::not_found;
 use glam::Vec3;
 use std::f32::consts::PI;
 use std::path::Path;
@@ -111,7 +112,7 @@ fn errors_name_file_line_and_field() {
         }
     }
     let message = Settings::load(&folder.0.path().join("none.toml")).unwrap_err().to_string();
-    assert!(message.contains("none.toml") && message.contains("No such file"), "{message}");
+    assert!(message.contains("none.toml") && message.contains(&not_found()), "{message}");
 }
 
 #[test]

@@ -11,6 +11,7 @@ use sunfleck::mesh::io::{Format, read, write};
 use sunfleck::scene::load::load_gltf_mesh;
 
 use super::{bumpy, check, placed, tetrahedron};
+use crate::not_found;
 
 fn sunfleck(args: &[&str]) -> Output {
     Command::cargo_bin("sunfleck").unwrap().arg("mesh-check").args(args).output().unwrap()
@@ -61,10 +62,11 @@ fn the_verdict_is_the_exit_code() {
     expect(&Mesh { faces: Vec::new(), ..mesh }, &[], 1, &["closed        no: there is no face"]);
     let unknown = folder.path().join("a.step");
     fs::write(&unknown, b"").unwrap();
+    let absent = format!("no.obj: {}", not_found());
     for (args, code, text) in [
         (&[][..], 2, "MESH"),
         (&[unknown.to_str().unwrap()], 1, "a.step: the extension \"step\" is none of .gltf, .glb, .obj, .ply"),
-        (&["no.obj"], 1, "no.obj: No such file or directory"),
+        (&["no.obj"], 1, &*absent),
         (&[name, "--fix"], 2, "--output <OUT>"),
         (&[name, "-o", "b.obj"], 2, "--fix"),
         (&[name, "--fix", "-o", "b.xyz"], 2, "b.xyz: meshes are written as"),

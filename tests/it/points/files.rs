@@ -10,6 +10,7 @@ use sunfleck::points::io::{read, read_obj, read_ply, read_xyz, write_ply};
 use sunfleck::points::{Cloud, Error, Match, Precision};
 
 use super::uniform;
+use crate::not_found;
 
 fn ply(text: &[u8]) -> Result<Cloud, String> {
     read_ply(text, text.len() as u64)
@@ -305,7 +306,7 @@ fn files_that_cannot_be_read() {
         ("a.stl", "none of .ply, .obj, .xyz"),
         ("b.xyz", "line 1: 2 columns"),
         ("c.ply", "is not a regular file"),
-        ("d.ply", "No such file"),
+        ("d.ply", &*not_found()),
     ] {
         let error = read(&at(name)).unwrap_err();
         assert!(matches!(error, Error::File { .. }));
@@ -385,10 +386,11 @@ fn the_program_refuses_in_one_line() {
     fs::write(at.join("two.xyz"), "0 0 0\n1 1 1\n").unwrap();
     fs::write(at.join("line.xyz"), "0 0 0\n1 1 1\n2 2 2\n3 3 3\n").unwrap();
     fs::write(at.join("bad.ply"), "ply\nformat ascii 1.0\nelement vertex 1\nend_header\n").unwrap();
+    let absent = format!("none.ply: {}", not_found());
     for (line, code, says) in [
         ("normals two.xyz -o o.ply", 1, "two.xyz: 2 points: a normal needs at least 3"),
         ("normals bad.ply -o o.ply", 1, "bad.ply: the header's element vertex lacks"),
-        ("normals none.ply -o o.ply", 1, "none.ply: No such file or directory"),
+        ("normals none.ply -o o.ply", 1, &*absent),
         ("normals two.xyz -o o.obj", 2, "clouds are written as .ply"),
         ("normals two.xyz -o no/o.ply", 1, "there is no folder no"),
         ("normals two.xyz -o o.ply -k 65", 2, "must be 3 to 64"),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use eframe::egui;
-use egui::{Button, DragValue};
+use egui::{Button, DragValue, gui_zoom};
 use sunfleck::scene::settings::parse_count;
 
 use super::app::Viewer;
@@ -89,6 +89,18 @@ pub fn show(ui: &mut egui::Ui, viewer: &mut Viewer) {
                 if ui.radio(theme == preference, name).on_hover_text("Colours of the window").clicked() {
                     ui.ctx().set_theme(preference);
                 }
+            }
+            ui.separator();
+            let zoom = ui.ctx().zoom_factor();
+            if ui.button("Larger interface").on_hover_text("Of text and panels (Ctrl and +)").clicked() {
+                gui_zoom::zoom_in(ui.ctx());
+            }
+            if ui.button("Smaller interface").on_hover_text("Of text and panels (Ctrl and −)").clicked() {
+                gui_zoom::zoom_out(ui.ctx());
+            }
+            let usual = ui.add_enabled(zoom != 1.0, Button::new("Usual size"));
+            if usual.on_hover_text(format!("It is {:.0} % of that now (Ctrl and 0)", zoom * 100.0)).clicked() {
+                ui.ctx().set_zoom_factor(1.0);
             }
         });
         if ui.button("Help").on_hover_text("Keys and mouse (?)").clicked() {

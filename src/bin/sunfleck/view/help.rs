@@ -19,6 +19,7 @@ const HAND: &[(&str, &str)] = &[
     ("Ctrl + wheel", "zoom into the picture; values appear in the pixels"),
     ("Ctrl + left drag", "shift the zoomed picture"),
     ("Shift held", "show the reference"),
+    ("Ctrl and +, −, 0", "larger, smaller, usual size of the interface"),
 ];
 
 /// Room that two columns need, points.

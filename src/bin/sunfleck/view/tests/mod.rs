@@ -10,6 +10,7 @@ mod habits;
 mod panels;
 mod shortcuts;
 mod snapshots;
+#[cfg(target_os = "linux")]
 mod window;
 
 use std::path::PathBuf;

@@ -135,6 +135,14 @@ fn every_item_of_the_menus() {
         window.press(Modifiers::NONE, Key::Escape);
         window.steps(2);
     }
+    for (item, percent) in
+        [("Larger interface", 110), ("Smaller interface", 100), ("Smaller interface", 90), ("Usual size", 100)]
+    {
+        choose(&mut window, "Window", item);
+        window.steps(2);
+        let zoom = window.harness.ctx.zoom_factor() * 100.0;
+        assert!((zoom - percent as f32).abs() < 0.1, "{item}: {zoom} %");
+    }
     for button in ["Pause", "Resume", "Step", "Restart", "Help"] {
         let before = (window.viewer().wanted.clone(), window.viewer().show_help);
         window.click(button);
@@ -145,6 +153,17 @@ fn every_item_of_the_menus() {
     window.wait("start page", |viewer| viewer.opened().is_none());
     choose(&mut window, "File", "Quit");
     assert!(window.commands.contains(&ViewportCommand::Close));
+}
+
+/// As far as egui goes.
+#[test]
+fn the_interface_can_be_as_large_or_small_as_can_be() {
+    let mut window = Window::with_picture();
+    for zoom in [5.0, 0.2, 1.0] {
+        window.harness.ctx.set_zoom_factor(zoom);
+        window.steps(3);
+        assert!(window.viewer().picture.area.is_some_and(|area| area.is_positive()), "{zoom}");
+    }
 }
 
 #[test]

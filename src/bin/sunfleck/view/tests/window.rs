@@ -132,7 +132,6 @@ impl Guest for Onlooker {
 
 /// Runs the test below under Xvfb.
 #[test]
-#[cfg(target_os = "linux")]
 fn a_window_that_loses_its_device_is_opened_again() {
     let is_required = std::env::var_os("SUNFLECK_REQUIRE_GPU").is_some();
     let has_adapter = !sunfleck::gpu::list_devices().is_empty();
@@ -153,7 +152,6 @@ fn a_window_that_loses_its_device_is_opened_again() {
 
 #[test]
 #[ignore = "the test above runs it, on a display of its own"]
-#[cfg(target_os = "linux")]
 fn loses_its_device() {
     use winit::platform::x11::EventLoopBuilderExtX11;
     let folder = tempfile::tempdir().unwrap();
