@@ -243,12 +243,10 @@ impl Context {
             Choice::Name(part) => info.name.to_lowercase().contains(&part.to_lowercase()),
         };
         found.retain(|(info, _)| wanted(info));
-        let is_real = found.first().map(|(info, _)| info.is_real());
-        // A card may be there twice, by several drivers. What is no hardware does not stand in for it.
-        let opened = found
-            .into_iter()
-            .take_while(|(info, _)| Some(info.is_real()) == is_real)
-            .map(|(info, adapter)| Self::open(info, &adapter, ray_queries));
+        // A card may be there twice, by several drivers. Another one does not stand in for it.
+        let best = found.first().map(|(info, _)| info.name.clone());
+        let same = found.into_iter().filter(|(info, _)| Some(&info.name) == best.as_ref());
+        let opened = same.map(|(info, adapter)| Self::open(info, &adapter, ray_queries));
         first_or_first_error(opened).unwrap_or_else(|| {
             Err(Error::NoDevice(match choice {
                 Choice::Real => format!("no hardware GPU{kind}; {}", list()),
@@ -530,10 +528,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_next_adapter_is_tried_and_the_first_error_told() {
-        let first = |results: &[Result<u32, &'static str>]| first_or_first_error(results.iter().copied());
-        assert_eq!(first(&[Err("a"), Ok(2), Ok(3)]), Some(Ok(2)));
-        assert_eq!(first(&[Err("a"), Err("b")]), Some(Err("a")));
-        assert_eq!(first(&[]), None);
+    fn adapters_are_tried_until_one_opens_and_the_first_error_is_told() {
+        let first = |opens: fn(u32) -> Result<u32, u32>, n| first_or_first_error((0..n).map(opens));
+        let second = |i| match i {
+            0 => Err(i),
+            1 => Ok(i),
+            _ => panic!("opened though there is one"),
+        };
+        assert_eq!(first(second, 3), Some(Ok(1)));
+        assert_eq!(first(Err, 3), Some(Err(0)));
+        assert_eq!(first(Ok, 0), None);
     }
 }

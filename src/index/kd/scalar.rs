@@ -49,8 +49,8 @@ impl Scalar for f32 {
     const INFINITY: Self = f32::INFINITY;
     const EPSILON: f64 = f32::EPSILON as f64;
     const EXPONENT: i32 = 40;
-    /// In double precision, in which the products are exact: a processor that is told of no fused multiply-add has none
-    /// but a function of the C library, which not all of these round once.
+    /// In double precision, in which the products are exact. Where the target has no fused multiply-add, that is a function of
+    /// the C library, and with mingw's it is rounded twice.
     #[inline]
     fn difference_of_products(a: Self, b: Self, c: Self, d: Self) -> Self {
         let [a, b, c, d] = [a, b, c, d].map(f64::from);

@@ -46,7 +46,7 @@ pub struct Request {
     pub purpose: Purpose,
     /// Absolute, if the working folder is known.
     pub folder: PathBuf,
-    /// A file that is saved is best called so.
+    /// A file that is saved is best called so; empty for one that is read.
     pub name: String,
 }
 
@@ -72,7 +72,8 @@ impl Dialog {
     }
 }
 
-/// The system's dialogs, which continue `blank`: over its window, if it has one.
+/// The system's dialogs, which continue `blank`: over its window, if it has one. Those of zenity take neither that nor the
+/// folder from rfd.
 pub fn system(blank: FileDialog) -> Pick {
     Arc::new(move |request| {
         // Fails if there is a logger, which is then this one.
@@ -136,12 +137,13 @@ pub fn ask(viewer: &mut Viewer, purpose: Purpose) {
     viewer.dialog = Some(Dialog { request, scene: viewer.wanted.scene.clone(), answer });
 }
 
-/// Begins where the last one for the same ended; the first one beside the scene's file, for pictures in the working folder.
+/// Begins where the scene's picture goes, if it is for that; else where the last one for the same ended; the first one beside
+/// the scene's file, for pictures in the working folder.
 fn request(viewer: &Viewer, purpose: Purpose) -> Request {
     let scene = viewer.wanted.scene.as_ref().map(|choice| Path::new(&choice.name));
     let picked = viewer.picked.get(&purpose).map(PathBuf::as_path);
     let stem = scene.and_then(Path::file_stem).map_or("picture".into(), |stem| stem.to_string_lossy());
-    let usual = format!("{stem}.{}", purpose.extension().unwrap_or_default());
+    let usual = purpose.extension().map_or(String::new(), |extension| format!("{stem}.{extension}"));
     let (last, name) = match (purpose, viewer.place()) {
         (Purpose::SavePicture, Some(place)) => (Some(place.as_path()), name_of(place).into_owned()),
         (Purpose::SavePicture, None) => (picked, usual),

@@ -50,12 +50,15 @@ fn a_dialog_begins_where_the_last_one_ended() {
     let stem = file.file_stem().unwrap().to_string_lossy();
     // The first beside the scene, pictures where the program was started.
     assert_eq!(ask(&mut window, Purpose::Reference).0, beside);
-    assert_eq!(ask(&mut window, Purpose::SavePicture), (here, format!("{stem}.exr")));
+    assert_eq!(ask(&mut window, Purpose::SavePicture), (here.clone(), format!("{stem}.exr")));
     assert_eq!(ask(&mut window, Purpose::SavePicture), (beside.join("a"), "first.exr".to_owned()));
     assert_eq!(ask(&mut window, Purpose::Reference).0, beside.join("a"));
     assert_eq!(ask(&mut window, Purpose::SaveSettings), (beside.clone(), format!("{stem}.toml")));
     *chosen.lock().unwrap() = window.path("a/other scene.toml");
     assert_eq!(ask(&mut window, Purpose::Open).0, beside);
+    // A shipped scene lies nowhere.
+    window.viewer().open("cornell");
+    assert_eq!(ask(&mut window, Purpose::Environment), (here, String::new()));
     assert_eq!(ask(&mut window, Purpose::Open).0, beside.join("a"));
 }
 
