@@ -3,9 +3,10 @@
 //! Woop, Benthin & Wald 2013, "Watertight Ray/Triangle Intersection": the corners are moved and sheared so that the ray is
 //! the z axis, and the signs of three edge functions decide. They are differences of two products, and rounding a product
 //! can make such a difference zero, but never turn its sign; where that happens, and for every triangle that is hit, the
-//! difference is taken again with the products' rounding errors ([`Scalar::difference_of_products`]). So the signs are right for the sheared
-//! corners in either precision, both triangles at an edge see the same sign, and a ray through an edge or a corner hits
-//! all that share it. The weights, and t with them, are accurate to a few roundings even for triangles seen edge-on.
+//! difference is taken again with the products' rounding errors ([`Scalar::difference_of_products`]). So the signs are
+//! right for the sheared corners in either precision, both triangles at an edge see the same sign, and a ray through an
+//! edge or a corner hits all that share it. The weights, and t with them, are accurate to a few roundings even for
+//! triangles seen edge-on.
 
 use super::{Error, Scalar};
 

@@ -81,24 +81,17 @@ pub fn system(blank: FileDialog) -> Pick {
             log::set_max_level(log::LevelFilter::Error);
         }
         DIALOG_FAULTS.0.store(false, Ordering::Relaxed);
-        let dialog = blank.clone().set_directory(&request.folder);
-        let path = match request.purpose {
-            Purpose::Open => dialog.set_title("Open a scene").add_filter("Scenes and settings", SCENES).pick_file(),
-            Purpose::SavePicture => dialog
-                .set_title("Save the picture")
-                .set_file_name(&request.name)
-                .add_filter("OpenEXR, PNG", &["exr", "png"])
-                .save_file(),
-            Purpose::SaveSettings => dialog
-                .set_title("Save the settings")
-                .set_file_name(&request.name)
-                .add_filter("Settings", &["toml"])
-                .save_file(),
-            Purpose::Reference => dialog.set_title("Open a reference").add_filter("OpenEXR", &["exr"]).pick_file(),
-            Purpose::Environment => dialog
-                .set_title("Open an environment")
-                .add_filter("Latitude-longitude maps", &["hdr", "exr"])
-                .pick_file(),
+        let (title, kind, extensions): (_, _, &[&str]) = match request.purpose {
+            Purpose::Open => ("Open a scene", "Scenes and settings", SCENES),
+            Purpose::SavePicture => ("Save the picture", "OpenEXR, PNG", &["exr", "png"]),
+            Purpose::SaveSettings => ("Save the settings", "Settings", &["toml"]),
+            Purpose::Reference => ("Open a reference", "OpenEXR", &["exr"]),
+            Purpose::Environment => ("Open an environment", "Latitude-longitude maps", &["hdr", "exr"]),
+        };
+        let dialog = blank.clone().set_directory(&request.folder).set_title(title).add_filter(kind, extensions);
+        let path = match request.purpose.extension() {
+            Some(_) => dialog.set_file_name(&request.name).save_file(),
+            None => dialog.pick_file(),
         };
         match path {
             Some(path) => Answer::File(path),
