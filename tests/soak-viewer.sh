@@ -69,7 +69,7 @@ while ((SECONDS - began < 60 * minutes)) && alive; do
     alive || break
     now="$(mib VmRSS)"
     ((now > most)) && most=$now
-    echo "$((SECONDS - began)) s: ${scenes[$scene]}, $now MiB; $(title)"
+    echo "$((SECONDS - began)) s: ${scenes[$scene]}, $now MiB, $(mib RssAnon) not shared; $(title)"
 done
 
 status=0

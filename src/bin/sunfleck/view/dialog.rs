@@ -101,11 +101,12 @@ pub fn system(blank: FileDialog) -> Pick {
     })
 }
 
-/// A name that was typed without an extension gets the usual one. It replaces no file then: the dialog asked that of the
-/// name it was given.
+/// A name that was typed without an extension gets the usual one; digits are none, as in "radius 0.5". It replaces no file
+/// then: the dialog asked that of the name it was given.
 pub fn with_extension(path: PathBuf, purpose: Purpose) -> PathBuf {
-    match (purpose.extension(), path.extension()) {
-        (Some(usual), None) => match path.with_extension(usual) {
+    let is_named = path.extension().is_some_and(|said| !said.as_encoded_bytes().iter().all(u8::is_ascii_digit));
+    match purpose.extension() {
+        Some(usual) if !is_named => match path.with_added_extension(usual) {
             path if path.exists() => free_name(&path),
             path => path,
         },
@@ -196,6 +197,21 @@ mod tests {
         }
         for purpose in [Purpose::Open, Purpose::Reference, Purpose::Environment] {
             assert!(without_dialog(&request(purpose, "x")).unwrap_err().contains("drop"));
+        }
+    }
+
+    #[test]
+    fn numbers_are_no_extension() {
+        for (name, picture, settings) in [
+            ("x", "x.exr", "x.toml"),
+            ("radius 0.5", "radius 0.5.exr", "radius 0.5.toml"),
+            ("x.png", "x.png", "x.png"),
+            ("x.mp4", "x.mp4", "x.mp4"),
+        ] {
+            let with_extension = |purpose| with_extension(Path::new("/no such folder").join(name), purpose);
+            assert_eq!(name_of(&with_extension(Purpose::SavePicture)), picture);
+            assert_eq!(name_of(&with_extension(Purpose::SaveSettings)), settings);
+            assert_eq!(name_of(&with_extension(Purpose::Open)), name);
         }
     }
 

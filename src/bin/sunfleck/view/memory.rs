@@ -10,15 +10,18 @@ pub fn give_back_large() {
     // Of glibc's `malloc.h`.
     const M_TRIM_THRESHOLD: c_int = -1;
     const M_MMAP_THRESHOLD: c_int = -3;
+    const M_ARENA_MAX: c_int = -8;
     /// Bytes; glibc begins at half of it, and raises that up to 32 MiB with what it sees dropped, unless it is set.
     const LARGE: c_int = 256 << 10;
     /// Bytes at the end of a heap that are kept for what comes next: as many as glibc comes to by itself.
     const KEPT: c_int = 64 << 20;
+    /// Heaps, which all keep what the largest scene put there; glibc has eight for each core, and gives a new thread any of them.
+    const HEAPS: c_int = 4;
 
     unsafe extern "C" {
         fn mallopt(parameter: c_int, value: c_int) -> c_int;
     }
-    for (parameter, value) in [(M_MMAP_THRESHOLD, LARGE), (M_TRIM_THRESHOLD, KEPT)] {
+    for (parameter, value) in [(M_MMAP_THRESHOLD, LARGE), (M_TRIM_THRESHOLD, KEPT), (M_ARENA_MAX, HEAPS)] {
         // SAFETY: this is its declaration in glibc's `malloc.h`, and there is no other thread yet, which is all it asks for.
         // Where it refuses, memory is kept as before.
         let _ = unsafe { mallopt(parameter, value) };
