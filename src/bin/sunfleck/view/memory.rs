@@ -13,8 +13,8 @@ pub fn give_back_large() {
     const M_ARENA_MAX: c_int = -8;
     /// Bytes; glibc begins at half of it, and raises that up to 32 MiB with what it sees dropped, unless it is set.
     const LARGE: c_int = 256 << 10;
-    /// Bytes at the end of a heap that are kept for what comes next: as many as glibc comes to by itself.
-    const KEPT: c_int = 64 << 20;
+    /// Bytes at the end of a heap that are kept for what comes next: enough for a frame. glibc by itself comes to 64 MiB.
+    const KEPT: c_int = 8 << 20;
     /// Heaps, which all keep what the largest scene put there; glibc has eight for each core, and gives a new thread any of them.
     const HEAPS: c_int = 4;
 
