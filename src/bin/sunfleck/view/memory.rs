@@ -1,7 +1,7 @@
 //! What a scene held goes back to the system when it is left ([ADR 14](../../../../docs/adr/0014-allocator.md)).
 
-/// Large arrays get pages of their own from now on, which are given back as they are dropped. To be called before there is
-/// any thread.
+/// Large arrays get pages of their own from now on, which are given back as they are dropped; what is smaller comes from a few
+/// heaps that keep little at their ends. To be called before there is any thread.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 #[allow(unsafe_code, reason = "docs/adr/0014-allocator.md")]
 pub fn give_back_large() {
@@ -15,7 +15,7 @@ pub fn give_back_large() {
     const LARGE: c_int = 256 << 10;
     /// Bytes at the end of a heap that are kept for what comes next: enough for a frame. glibc by itself comes to 64 MiB.
     const KEPT: c_int = 8 << 20;
-    /// Heaps, which all keep what the largest scene put there; glibc has eight for each core, and gives a new thread any of them.
+    /// Heaps, each of which comes to keep so much; glibc has up to eight for each core, and gives a new thread any of them.
     const HEAPS: c_int = 4;
 
     unsafe extern "C" {
