@@ -102,7 +102,7 @@ fn trace_eye(
                 if !incoming.point_like && !bsdf_is_diffuse(bsdf) {
                     share = incoming.pdf / (incoming.pdf + bsdf_pdf(bsdf, outgoing, incoming.direction, lobes));
                 }
-                let cosine = abs(dot(bsdf.frame.z, incoming.direction));
+                let cosine = abs(dot(bsdf.basis.z, incoming.direction));
                 let arriving = f * incoming.light * (cosine * share / incoming.pdf);
                 pending = throughput * (arriving * transmittance(medium, incoming.distance));
                 light_ray.origin = trace_leave(s.position, s.normal, incoming.direction);

@@ -1,4 +1,4 @@
-// Orthonormal frames, as in src/math/frame.rs (`Frame` is taken by the layout), and small things all of the rest needs.
+// Orthonormal bases, as in src/math/basis.rs, and small things all of the rest needs.
 #import oct
 
 const PI: f32 = 3.14159265;

@@ -16,7 +16,7 @@ const LOBE_SPECULAR: u32 = 2u;
 const LOBES_ALL: u32 = 3u;
 
 struct Bsdf {
-    frame: Basis,
+    basis: Basis,
     normal: vec3<f32>,
     base_color: vec3<f32>,
     f0: vec3<f32>,
@@ -43,7 +43,7 @@ struct Scatter {
     ok: bool,
 }
 
-// Frame coordinates, BSDF × cosine / density, density.
+// Basis coordinates, BSDF × cosine / density, density.
 struct Weighed {
     o: vec3<f32>,
     weight: vec3<f32>,
@@ -79,7 +79,7 @@ fn bsdf_of_vertex(v: EyeVertex) -> Bsdf {
 fn bsdf_with_known(b: Bsdf, known: vec3<f32>) -> Bsdf {
     var with_known = b;
     if !bsdf_is_diffuse(b) {
-        with_known.known_albedo = bsdf_lobe_albedo(b, max(dot(b.frame.z, known), 0.0));
+        with_known.known_albedo = bsdf_lobe_albedo(b, max(dot(b.basis.z, known), 0.0));
     }
     return with_known;
 }
@@ -195,8 +195,8 @@ fn bsdf_local(b: Bsdf, k: vec3<f32>, o: vec3<f32>, lobes: u32, transport: u32) -
 
 // 1/sr, without the mirrors' peaks; world space.
 fn bsdf_evaluate(b: Bsdf, known: vec3<f32>, other: vec3<f32>, lobes: u32, transport: u32) -> vec3<f32> {
-    let k = basis_local(b.frame, known);
-    let o = basis_local(b.frame, other);
+    let k = basis_local(b.basis, known);
+    let o = basis_local(b.basis, other);
     if k.z <= 0.0 || o.z * dot(other, b.normal) <= 0.0 {
         return vec3(0.0);
     }
@@ -241,8 +241,8 @@ fn bsdf_follow_probability(b: Bsdf) -> f32 {
 
 // Density with which bsdf_sample chooses a direction, per steradian; mirrors do not count.
 fn bsdf_pdf(b: Bsdf, known: vec3<f32>, other: vec3<f32>, lobes: u32) -> f32 {
-    let k = basis_local(b.frame, known);
-    let o = basis_local(b.frame, other);
+    let k = basis_local(b.basis, known);
+    let o = basis_local(b.basis, other);
     if k.z <= 0.0 || o.z * dot(other, b.normal) <= 0.0 {
         return 0.0;
     }
@@ -286,7 +286,7 @@ const NOWHERE: Weighed = Weighed(vec3<f32>(0.0), vec3<f32>(0.0), 0.0, false);
 
 // A direction for `known`, by three numbers in [0, 1).
 fn bsdf_sample(b: Bsdf, known: vec3<f32>, lobes: u32, transport: u32, u: vec3<f32>) -> Scatter {
-    let k = basis_local(b.frame, known);
+    let k = basis_local(b.basis, known);
     if k.z <= 0.0 {
         return ENDED;
     }
@@ -324,13 +324,13 @@ fn bsdf_sample(b: Bsdf, known: vec3<f32>, lobes: u32, transport: u32, u: vec3<f3
     if !found.ok {
         return ENDED;
     }
-    let direction = basis_world(b.frame, found.o);
+    let direction = basis_world(b.basis, found.o);
     let across = dot(direction, b.normal);
     if found.o.z * across <= 0.0 {
         return ENDED; // The shading normal sends it to the wrong side of the real surface.
     }
     var weight = found.weight;
-    if transport == IMPORTANCE && any(b.frame.z != b.normal) {
+    if transport == IMPORTANCE && any(b.basis.z != b.normal) {
         let swap = k.z * across / (dot(known, b.normal) * found.o.z);
         weight *= min(abs(swap), MAX_SHADING_CORRECTION);
     }

@@ -321,6 +321,6 @@ fn light_emit(u: vec3<f32>, v: vec3<f32>) -> Emission {
 // On the disc that the scene's bounding sphere shows to light travelling along `direction`, before the scene.
 fn light_on_disc(direction: vec3<f32>, u: vec2<f32>) -> vec3<f32> {
     let p = warp_disc(u) * scene_info.radius;
-    let frame = basis_around(direction);
-    return scene_info.centre + frame.x * p.x + frame.y * p.y - direction * scene_info.radius;
+    let basis = basis_around(direction);
+    return scene_info.centre + basis.x * p.x + basis.y * p.y - direction * scene_info.radius;
 }

@@ -10,7 +10,7 @@ use glam::Vec3;
 
 use super::surface::Surface;
 use crate::layout::{EyeVertex, MATERIAL_VOLUME};
-use crate::math::{frame::Frame, ggx, oct, warp};
+use crate::math::{basis::Basis, ggx, oct, warp};
 use crate::scene::{PackedScene, albedo};
 
 /// Smoother coats are followed by the eye path; photons are gathered on the others.
@@ -44,7 +44,7 @@ impl Lobes {
 pub struct Bsdf<'a> {
     table: &'a [[f32; 2]],
     /// Around the shading normal on the known side.
-    pub frame: Frame,
+    pub basis: Basis,
     /// Geometric normal on the known side.
     pub normal: Vec3,
     base_color: Vec3,
@@ -89,7 +89,7 @@ impl<'a> Bsdf<'a> {
         let volume = m.flags & MATERIAL_VOLUME != 0;
         Self {
             table: &scene.albedo,
-            frame: Frame::around(s.shading_normal),
+            basis: Basis::around(s.shading_normal),
             normal: s.normal,
             base_color: s.base_color,
             f0: m.f0.into(),
@@ -107,7 +107,7 @@ impl<'a> Bsdf<'a> {
     pub fn of_vertex(scene: &'a PackedScene, v: &EyeVertex) -> Self {
         Self {
             table: &scene.albedo,
-            frame: Frame::around(oct::decode(v.shading_normal)),
+            basis: Basis::around(oct::decode(v.shading_normal)),
             normal: oct::decode(v.normal),
             base_color: v.base_color.into(),
             f0: v.f0.into(),
@@ -188,7 +188,7 @@ impl<'a> Bsdf<'a> {
         if self.f90 == 0.0 { base } else { base * (Vec3::ONE - self.coat_albedo(cos_eye)) }
     }
 
-    /// Coat, metal and glass, 1/sr; frame coordinates. Zero where they are mirrors.
+    /// Coat, metal and glass, 1/sr; basis coordinates. Zero where they are mirrors.
     fn specular(&self, known: Vec3, other: Vec3, transport: Transport) -> Vec3 {
         if self.is_smooth() || self.is_diffuse() || known.z <= 0.0 || other.z == 0.0 {
             return Vec3::ZERO;
@@ -229,7 +229,7 @@ impl<'a> Bsdf<'a> {
 
     /// 1/sr, without the mirrors' peaks; world space. The known direction is above the surface.
     pub fn evaluate(&self, known: Vec3, other: Vec3, lobes: Lobes, transport: Transport) -> Vec3 {
-        let (k, o) = (self.frame.local(known), self.frame.local(other));
+        let (k, o) = (self.basis.local(known), self.basis.local(other));
         if k.z <= 0.0 || o.z * other.dot(self.normal) <= 0.0 {
             return Vec3::ZERO;
         }
@@ -273,13 +273,13 @@ impl<'a> Bsdf<'a> {
         if !gathered.diffuse {
             return 1.0;
         }
-        let choice = self.choice(self.frame.local(known).z.max(0.0), Lobes::ALL);
+        let choice = self.choice(self.basis.local(known).z.max(0.0), Lobes::ALL);
         (1.0 - choice.diffuse).clamp(0.1, 0.9)
     }
 
     /// Density with which [`Bsdf::sample`] chooses a direction, per steradian; mirrors do not count.
     pub fn pdf(&self, known: Vec3, other: Vec3, lobes: Lobes) -> f32 {
-        let (k, o) = (self.frame.local(known), self.frame.local(other));
+        let (k, o) = (self.basis.local(known), self.basis.local(other));
         if k.z <= 0.0 || o.z * other.dot(self.normal) <= 0.0 { 0.0 } else { self.local_pdf(k, o, lobes) }
     }
 
@@ -316,7 +316,7 @@ impl<'a> Bsdf<'a> {
 
     /// A direction for `known`, by three numbers in [0, 1); none if the light ends here.
     pub fn sample(&self, known: Vec3, lobes: Lobes, transport: Transport, u: [f32; 3]) -> Option<Scatter> {
-        let k = self.frame.local(known);
+        let k = self.basis.local(known);
         if k.z <= 0.0 {
             return None;
         }
@@ -344,11 +344,11 @@ impl<'a> Bsdf<'a> {
                 self.weigh(k, o, lobes, transport)?
             }
         };
-        let direction = self.frame.world(o);
+        let direction = self.basis.world(o);
         if o.z * direction.dot(self.normal) <= 0.0 {
             return None; // The shading normal sends it to the wrong side of the real surface.
         }
-        let weight = if transport == Transport::Importance && self.frame.z != self.normal {
+        let weight = if transport == Transport::Importance && self.basis.z != self.normal {
             let swap = k.z * direction.dot(self.normal) / (known.dot(self.normal) * o.z);
             weight * swap.abs().min(MAX_SHADING_CORRECTION)
         } else {

@@ -129,7 +129,7 @@ fn direct(
     if f == Vec3::ZERO || incoming.light == Vec3::ZERO {
         return Vec3::ZERO;
     }
-    let cos = bsdf.frame.z.dot(incoming.direction).abs();
+    let cos = bsdf.basis.z.dot(incoming.direction).abs();
     let share = if incoming.point_like || !found_too || bsdf.is_diffuse() {
         1.0
     } else {
@@ -187,7 +187,7 @@ fn fill(vertex: &mut EyeVertex, scene: &PackedScene, bsdf: &Bsdf, s: &Surface, o
     vertex.position = s.position.to_array();
     vertex.flags = EYE_GATHER | if gathered.specular { EYE_GLOSSY } else { 0 };
     vertex.normal = oct::encode(s.normal);
-    vertex.diffuse = bsdf.diffuse(bsdf.frame.z.dot(outgoing)).to_array();
+    vertex.diffuse = bsdf.diffuse(bsdf.basis.z.dot(outgoing)).to_array();
     vertex.shading_normal = oct::encode(s.shading_normal);
     vertex.base_color = s.base_color.to_array();
     vertex.outgoing = oct::encode(outgoing);

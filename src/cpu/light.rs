@@ -11,7 +11,7 @@ use crate::layout::{
     LIGHT_AREA, LIGHT_DIRECTIONAL, LIGHT_ENVIRONMENT, LIGHT_POINT, LIGHT_SPOT, Light, MATERIAL_DOUBLE_SIDED, NONE,
     PRIMITIVE_SPHERE, Primitive,
 };
-use crate::math::{frame::Frame, warp};
+use crate::math::{basis::Basis, warp};
 use crate::scene::{Environment, PackedScene};
 
 /// Light that may arrive at a point.
@@ -252,7 +252,7 @@ pub fn emit(scene: &PackedScene, u: [f32; 3], v: [f32; 3]) -> Option<Emission> {
                     normal = -normal;
                 }
             }
-            let direction = Frame::around(normal).world(warp::cosine(angle));
+            let direction = Basis::around(normal).world(warp::cosine(angle));
             let power = surface::emission(scene, p, &attributes) * (PI * light.area * sides * chosen);
             Some(Emission { origin: trace::leave(scene, at, normal, direction), direction, power })
         }
@@ -263,7 +263,7 @@ pub fn emit(scene: &PackedScene, u: [f32; 3], v: [f32; 3]) -> Option<Emission> {
         }),
         LIGHT_SPOT => {
             let local = warp::cone(angle, light.cos_outer);
-            let direction = Frame::around(light.direction.into()).world(local);
+            let direction = Basis::around(light.direction.into()).world(local);
             let power = Vec3::from(light.intensity) * (spot(light, direction) * TAU * (1.0 - light.cos_outer) * chosen);
             (power.max_element() > 0.0).then(|| Emission { origin: light.position.into(), direction, power })
         }
@@ -287,6 +287,6 @@ pub fn emit(scene: &PackedScene, u: [f32; 3], v: [f32; 3]) -> Option<Emission> {
 /// On the disc that the scene's bounding sphere shows to light travelling along `direction`, before the scene.
 fn on_disc(scene: &PackedScene, direction: Vec3, u: [f32; 2]) -> Vec3 {
     let p = warp::disc(u) * scene.info.radius;
-    let frame = Frame::around(direction);
-    Vec3::from(scene.info.centre) + frame.x * p.x + frame.y * p.y - direction * scene.info.radius
+    let basis = Basis::around(direction);
+    Vec3::from(scene.info.centre) + basis.x * p.x + basis.y * p.y - direction * scene.info.radius
 }

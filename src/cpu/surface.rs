@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::texture::{self, Attributes};
 use super::trace::{self, Hit};
 use crate::layout::{MATERIAL_DOUBLE_SIDED, NONE, PRIMITIVE_FLAT, PRIMITIVE_MIRRORED_UV, PRIMITIVE_SPHERE, Primitive};
-use crate::math::frame::Frame;
+use crate::math::basis::Basis;
 use crate::scene::PackedScene;
 
 /// A point on a surface as met from one side; the normals point to that side.
@@ -119,8 +119,8 @@ fn shading_normal(
         let along = mix(a.tangent, b.tangent, c.tangent);
         let along = (along - interpolated * interpolated.dot(along)).normalize_or_zero();
         if along == Vec3::ZERO {
-            let frame = Frame::around(interpolated);
-            n = frame.world(t).normalize_or(interpolated);
+            let basis = Basis::around(interpolated);
+            n = basis.world(t).normalize_or(interpolated);
         } else {
             let hand = if p.flags & PRIMITIVE_MIRRORED_UV != 0 { -1.0 } else { 1.0 };
             n = (along * t.x + interpolated.cross(along) * (hand * t.y) + interpolated * t.z)

@@ -1,4 +1,4 @@
-//! The isotropic GGX distribution of microfacet normals, in a frame whose z is the surface normal.
+//! The isotropic GGX distribution of microfacet normals, in a basis whose z is the surface normal.
 
 use std::f32::consts::{PI, TAU};
 

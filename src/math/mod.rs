@@ -1,7 +1,7 @@
 //! Directions, random numbers, warps and seeded point sets. Knows nothing of the rest of the crate.
 
+pub mod basis;
 pub mod clouds;
-pub mod frame;
 pub mod ggx;
 pub mod morton;
 pub mod oct;

@@ -9,7 +9,7 @@ use sunfleck::cpu::light;
 use sunfleck::cpu::surface::Surface;
 use sunfleck::cpu::trace::{self, Ray, Seer};
 use sunfleck::layout::{MATERIAL_DOUBLE_SIDED, NONE};
-use sunfleck::math::{frame::Frame, ggx, rng, warp};
+use sunfleck::math::{basis::Basis, ggx, rng, warp};
 use sunfleck::scene::{Environment, Material, Mesh, PackedScene, Scene, Sphere};
 
 const THETAS: usize = 32;
@@ -231,7 +231,7 @@ fn bsdf_samples_follow_their_density() {
     for (name, material, front) in materials() {
         let scene = packed(&material);
         let bsdf = Bsdf::new(&scene, &surface(&material, front, NORMAL, NORMAL));
-        let around = Frame::around(NORMAL);
+        let around = Basis::around(NORMAL);
         for theta in ANGLES {
             let known = around.world(direction(theta, 2.0));
             for (lobes, which) in [
@@ -260,14 +260,14 @@ fn bsdf_samples_follow_their_density() {
 /// 1997, equation 5.20).
 #[test]
 fn bsdf_weights_are_the_function_over_the_density() {
-    let bent = (NORMAL + 0.25 * Frame::around(NORMAL).x).normalize();
+    let bent = (NORMAL + 0.25 * Basis::around(NORMAL).x).normalize();
     let mut n_checked = 0;
     for (name, material, front) in materials() {
         let scene = packed(&material);
         for shading in [NORMAL, bent] {
             let bsdf = Bsdf::new(&scene, &surface(&material, front, NORMAL, shading));
             for theta in ANGLES {
-                let known = Frame::around(shading).world(direction(theta, 2.0));
+                let known = Basis::around(shading).world(direction(theta, 2.0));
                 for transport in [Transport::Radiance, Transport::Importance] {
                     for i in 0..2000 {
                         let [a, b, c, _] = numbers(i, 5);
@@ -303,7 +303,7 @@ fn bsdf_weights_add_up_to_the_albedo() {
         for (material, is_white) in [(material, false), (white, true)] {
             let scene = packed(&material);
             let bsdf = Bsdf::new(&scene, &surface(&material, front, NORMAL, NORMAL));
-            let around = Frame::around(NORMAL);
+            let around = Basis::around(NORMAL);
             for (theta, transport) in
                 ANGLES.iter().flat_map(|&t| [(t, Transport::Radiance), (t, Transport::Importance)])
             {
@@ -357,7 +357,7 @@ fn eye_and_photons_scatter_alike() {
         let (mut n_reflected, mut n_transmitted) = (0, 0);
         for i in 0..4000 {
             let [a, b, c, d] = numbers(i, 8);
-            let around = Frame::around(NORMAL);
+            let around = Basis::around(NORMAL);
             let eye = around.world(warp::cosine([a, b]));
             let light = around.world(warp::sphere([c, d]));
             let side = light.dot(NORMAL);
@@ -403,7 +403,7 @@ fn smooth_lobes_split_by_fresnel() {
         let scene = packed(&material);
         let bsdf = Bsdf::new(&scene, &surface(&material, front, NORMAL, NORMAL));
         let eta = if volume && !front { 1.0 / f64::from(ior) } else { f64::from(ior) };
-        let around = Frame::around(NORMAL);
+        let around = Basis::around(NORMAL);
         for theta in [0.1, 0.35, 0.6, 0.8, 1.2, 1.5] {
             let k = direction(theta, 2.0);
             let reflects = fresnel(theta, eta);
@@ -441,7 +441,7 @@ fn smooth_lobes_split_by_fresnel() {
         let scene = packed(&material);
         let bsdf = Bsdf::new(&scene, &surface(&material, true, NORMAL, NORMAL));
         for theta in ANGLES {
-            let known = Frame::around(NORMAL).world(direction(theta, 2.0));
+            let known = Basis::around(NORMAL).world(direction(theta, 2.0));
             let n = 40_000;
             let weights = (0..n).map(|i| {
                 let [a, b, c, _] = numbers(i, 12);

@@ -1,10 +1,10 @@
-//! Orthonormal frames.
+//! Orthonormal bases.
 
 use glam::Vec3;
 
-/// A right-handed orthonormal frame; z is the surface normal.
+/// A right-handed orthonormal basis; z is the surface normal.
 #[derive(Clone, Copy, Debug)]
-pub struct Frame {
+pub struct Basis {
     /// Unit.
     pub x: Vec3,
     /// Unit.
@@ -13,7 +13,7 @@ pub struct Frame {
     pub z: Vec3,
 }
 
-impl Frame {
+impl Basis {
     /// Around a unit vector (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
     #[inline]
     pub fn around(z: Vec3) -> Self {
@@ -27,13 +27,13 @@ impl Frame {
         }
     }
 
-    /// Frame coordinates of a world vector.
+    /// Coordinates in the basis of a world vector.
     #[inline]
     pub fn local(&self, w: Vec3) -> Vec3 {
         Vec3::new(self.x.dot(w), self.y.dot(w), self.z.dot(w))
     }
 
-    /// World vector of frame coordinates.
+    /// World vector of coordinates in the basis.
     #[inline]
     pub fn world(&self, l: Vec3) -> Vec3 {
         self.x * l.x + self.y * l.y + self.z * l.z
@@ -49,7 +49,7 @@ mod tests {
         for i in 0..2000u32 {
             let [u, v, w, _] = crate::math::rng::unit4(crate::math::rng::pcg4d([i, 0, 0, 0]));
             let z = (Vec3::new(u, v, w) * 2.0 - 1.0).normalize_or(Vec3::NEG_Z);
-            let f = Frame::around(z);
+            let f = Basis::around(z);
             assert!((f.x.cross(f.y) - f.z).length() < 1e-5, "{f:?}");
             assert!((f.x.length() - 1.0).abs() < 1e-5 && f.x.dot(f.y).abs() < 1e-5);
             let p = Vec3::new(0.3, -2.0, 0.7);
