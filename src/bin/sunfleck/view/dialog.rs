@@ -1,5 +1,6 @@
 //! The system's dialogs for files.
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
@@ -101,17 +102,17 @@ pub fn system(blank: FileDialog) -> Pick {
     })
 }
 
-/// A name that was typed without an extension gets the usual one; digits are none, as in "radius 0.5". It replaces no file
-/// then: the dialog asked that of the name it was given.
+/// A name that was typed without an extension gets the usual one; digits are none, as in "radius 0.5", and a dot at the end
+/// begins one. It replaces no file then: the dialog asked that of the name it was given.
 pub fn with_extension(path: PathBuf, purpose: Purpose) -> PathBuf {
-    let is_named = path.extension().is_some_and(|said| !said.as_encoded_bytes().iter().all(u8::is_ascii_digit));
-    match purpose.extension() {
-        Some(usual) if !is_named => match path.with_added_extension(usual) {
-            path if path.exists() => free_name(&path),
-            path => path,
-        },
-        _ => path,
-    }
+    let said = path.extension().map(OsStr::as_encoded_bytes);
+    let Some(usual) = purpose.extension() else { return path };
+    let named = match said {
+        Some(b"") => path.with_extension(usual),
+        Some(said) if !said.iter().all(u8::is_ascii_digit) => return path,
+        _ => path.with_added_extension(usual),
+    };
+    if named.exists() { free_name(&named) } else { named }
 }
 
 /// Asks for a file with a dialog.
@@ -204,6 +205,7 @@ mod tests {
     fn numbers_are_no_extension() {
         for (name, picture, settings) in [
             ("x", "x.exr", "x.toml"),
+            ("x.", "x.exr", "x.toml"),
             ("radius 0.5", "radius 0.5.exr", "radius 0.5.toml"),
             ("x.png", "x.png", "x.png"),
             ("x.mp4", "x.mp4", "x.mp4"),
