@@ -1,6 +1,7 @@
 //! Where to look at a scene from that does not say.
 
 use super::inside::Room;
+use super::subject::Subject;
 use super::view::Lamps;
 use crate::scene::{Camera, Scene, Sphere};
 use glam::Vec3;
@@ -22,20 +23,20 @@ const LEAN: f32 = 0.25;
 /// Views that are tried at the same time.
 const VIEWS_AT_ONCE: usize = 5;
 
-/// A camera that has the whole scene in view, and the spheres `more`, in pictures at least as wide as high, and as near as
-/// that lets it: a little from the right, a little from above. Rooms made of one inward sphere do not count as long as
-/// there is something else.
+/// A camera that has the scene and the spheres `more` in view, in pictures at least as wide as high, and as near as that lets
+/// it: a little from the right, a little from above. What lies far outside nearly all of it, and makes it a speck, does not
+/// count ([`Scene::subject_bounds`]), nor do rooms made of one inward sphere as long as there is something else.
 ///
 /// Where clearly more of what is seen faces a lamp from another side, as before a room of which a wall is left out, it stands
 /// there; so that z is up if the lamps of that room say so. Where nothing lit is seen from any side, as around a closed room,
 /// it stands inside, if there is something to be seen.
 pub fn default_camera(scene: &Scene, more: &[Sphere]) -> Camera {
-    let outside = bounding_sphere(scene, more, false);
-    let with_inward = outside.is_none();
-    let (centre, radius) = outside.or_else(|| bounding_sphere(scene, more, true)).unwrap_or_default();
+    let outside = Subject::new(scene, more, false);
+    let subject = if outside.bounds().is_some() { outside } else { Subject::new(scene, more, true) };
+    let (centre, radius) = subject.bounding_sphere().unwrap_or_default();
     let radius = if radius > 0.0 { radius } else { 1.0 };
     let framed = |view: View| {
-        let points = points(scene, more, with_inward).map(|(p, radius)| (p - centre, radius));
+        let points = subject.points().map(|(p, radius)| (p - centre, radius));
         view.framing(points, centre, radius)
     };
     let usual = framed(View::y_up(USUAL));
@@ -67,8 +68,8 @@ pub fn default_camera(scene: &Scene, more: &[Sphere]) -> Camera {
         }
         let room = Room::new(scene, &lamps)?;
         let up = if is_z_up { Vec3::Z } else { Vec3::Y };
-        let [low, high] = bounding_box(scene, more, with_inward)?;
-        if room.is_dark(&best.1, LEAST_SHARE) { room.camera_inside([low, high], up, more) } else { None }
+        let bounds = subject.bounds()?;
+        if room.is_dark(&best.1, LEAST_SHARE) { room.camera_inside(bounds, up, more) } else { None }
     };
     inside().unwrap_or(best.1)
 }
@@ -127,40 +128,6 @@ impl View {
         let target = centre + right * (0.5 * (right_side - left_side)) + up * (0.5 * (top - bottom));
         Camera::look_at("default", target + towards * distance, target, self.up, YFOV)
     }
-}
-
-/// Vertices, and spheres with their radii. Only vertices in use: files carry stray ones.
-fn points<'a>(scene: &'a Scene, more: &'a [Sphere], with_inward: bool) -> impl Iterator<Item = (Vec3, f32)> + 'a {
-    let vertices = scene
-        .meshes
-        .iter()
-        .flat_map(|mesh| mesh.triangles.iter().flatten().filter_map(move |&i| mesh.positions.get(i as usize).copied()));
-    let spheres = scene.spheres.iter().chain(more).filter(move |sphere| with_inward || !sphere.inward);
-    vertices.map(|p| (p, 0.0)).chain(spheres.map(|s| (s.centre, s.radius)))
-}
-
-impl Scene {
-    /// Least and greatest corner of all surfaces and of the spheres `more`, metres; none if there are none.
-    pub fn bounds(&self, more: &[Sphere]) -> Option<[Vec3; 2]> {
-        bounding_box(self, more, true)
-    }
-}
-
-fn bounding_box(scene: &Scene, more: &[Sphere], with_inward: bool) -> Option<[Vec3; 2]> {
-    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for (p, radius) in points(scene, more, with_inward) {
-        low = low.min(p - radius);
-        high = high.max(p + radius);
-    }
-    (low.is_finite() && high.is_finite()).then_some([low, high])
-}
-
-/// Centre of the bounding box of everything and the radius that reaches every point.
-fn bounding_sphere(scene: &Scene, more: &[Sphere], with_inward: bool) -> Option<(Vec3, f32)> {
-    let [low, high] = bounding_box(scene, more, with_inward)?;
-    let centre = 0.5 * (low + high);
-    let reach = points(scene, more, with_inward).map(|(p, radius)| p.distance(centre) + radius).fold(0.0, f32::max);
-    Some((centre, reach))
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 mod camera;
 mod inside;
+mod subject;
 mod view;
 
 pub use camera::default_camera;

@@ -131,8 +131,8 @@ pub struct Opened {
     pub read: Settings,
     /// As the file has it, before settings; the default camera is added if it has none.
     pub loaded: Loaded,
-    /// Least and greatest corner of the scene and of the spheres that its settings add, metres; those of a cube of side 1
-    /// about the origin if there is nothing.
+    /// Least and greatest corner of the scene and of the spheres that its settings add, without what lies far outside
+    /// ([`sunfleck::scene::Scene::subject_bounds`]), metres; those of a cube of side 1 about the origin if there is nothing.
     pub bounds: [Vec3; 2],
     /// Whether the default camera stands within them: in a closed room, or under a dome.
     pub is_closed: bool,

@@ -78,7 +78,8 @@ pub fn open(choice: &Arc<Choice>, on_host: bool, interrupt: &Interrupt) -> Resul
     interrupt.check()?;
     let has_camera = !loaded.scene.cameras.is_empty();
     source.settings.add_default_camera(&mut loaded.scene);
-    let bounds = loaded.scene.bounds(&source.settings.added_spheres()).unwrap_or([-0.5, 0.5].map(Vec3::splat));
+    let bounds = loaded.scene.subject_bounds(&source.settings.added_spheres());
+    let bounds = bounds.unwrap_or([-0.5, 0.5].map(Vec3::splat));
     let stands_at = loaded.scene.cameras.first().map(|camera| Vec3::from(camera.world_from_camera.translation));
     let is_inside = stands_at.is_some_and(|at| at.clamp(bounds[0], bounds[1]) == at);
     let is_closed = !has_camera && is_inside;

@@ -40,8 +40,8 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, read: &Settings) {
     place(ui, viewer, &camera, file.as_ref());
     lens(ui, viewer, &camera, file.as_ref());
     ui.horizontal_wrapped(|ui| {
-        let hint = "Moves the camera until the whole scene is in the picture, in a closed room to where it began \
-                    (F). Restarts the estimate.";
+        let hint = "Moves the camera until the scene is in the picture, but for what lies far outside; in a closed room to \
+                    where it began (F). Restarts the estimate.";
         if ui.button("Frame all").on_hover_text(hint).clicked() {
             viewer.frame_all(ui.input(|i| i.time));
         }
