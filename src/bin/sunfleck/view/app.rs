@@ -123,8 +123,10 @@ pub struct Viewer {
     /// Of the last estimate that was no preview; one that takes this long or longer is preceded by a preview.
     iteration_seconds: f64,
     pub preview_from: f64,
-    /// What was open before.
-    pub previous: Option<Arc<Choice>>,
+    /// What was open before, and how it was edited.
+    pub previous: Option<(Arc<Choice>, Edits)>,
+    /// The edits of the scene that is opened again.
+    returning: Option<Edits>,
     /// Of [`First`].
     always: Vec<String>,
     limits: LimitsOfScenes,
@@ -174,6 +176,7 @@ impl Viewer {
             iteration_seconds: 0.0,
             preview_from: PREVIEW_FROM,
             previous: None,
+            returning: None,
             always: first.always,
             limits: LimitsOfScenes::new(first.limits),
             most_side: 0,
@@ -207,6 +210,8 @@ impl Viewer {
             return;
         }
         self.picture.forget();
+        self.picture.rest();
+        self.edits.end_step();
         self.compare.forget();
         (self.start, self.timing, self.title) = (Default::default(), Default::default(), String::new());
         // It sees no key let go that is held now.
@@ -222,21 +227,23 @@ impl Viewer {
     /// The same, with `key=value` over its settings.
     pub fn open_with(&mut self, name: impl Into<String>, set: Vec<String>) {
         if self.editing.is_some() {
-            self.previous = self.wanted.scene.clone();
+            self.previous = self.wanted.scene.clone().map(|scene| (scene, self.edits.clone()));
         }
         self.want(Some(Arc::new(Choice { name: name.into(), set: [set, self.always.clone()].concat() })));
     }
 
-    /// Opens what was open before.
+    /// Opens what was open before, as it was edited.
     pub fn back(&mut self) {
-        let scene = self.previous.take();
-        self.want(scene);
+        let Some((scene, edits)) = self.previous.take() else { return };
+        self.want(Some(scene));
+        self.wanted.settings = Some(Arc::clone(edits.now()));
+        self.returning = Some(edits);
     }
 
     /// A scene as its file has it.
     fn want(&mut self, scene: Option<Arc<Choice>>) {
         self.wanted.scene = scene;
-        (self.wanted.settings, self.wanted.reads_again) = (None, false);
+        (self.wanted.settings, self.wanted.reads_again, self.returning) = (None, false, None);
         self.wanted.limits_at_first = Some(self.limits.flags());
         self.wanted.reloads += 1;
     }
@@ -361,10 +368,19 @@ impl Viewer {
         let iterations = self.now.snapshot.as_ref().map_or(1, |snapshot| snapshot.film.n_iterations);
         let flags = self.engine.device_flags();
         // It may be pasted anywhere. A shipped scene has no place.
-        let Source { name, canonical, .. } = &opened.source;
-        let absolute = canonical.as_ref().and_then(|_| crate::scenes::absolute(Path::new(name)).ok());
-        let scene = absolute.as_ref().unwrap_or(name);
-        Some(opened.command(scene, self.edits.now(), flags, iterations, Path::new("picture.exr")))
+        let Source { name, canonical, folder, .. } = &opened.source;
+        let absolute = |path: &str| crate::scenes::absolute(Path::new(path)).ok();
+        let there = canonical.as_ref().and_then(|_| absolute(name));
+        let scene = there.as_ref().unwrap_or(name);
+        let mut settings = self.edits.now().as_ref().clone();
+        // Beside a settings file it is named from there, which the command names from the root.
+        if folder.as_os_str().is_empty()
+            && settings.environment != opened.read().environment
+            && let Some(file) = settings.environment.as_mut().and_then(|environment| environment.file.as_mut())
+        {
+            *file = absolute(file).unwrap_or_else(|| file.clone());
+        }
+        Some(opened.command(scene, &settings, flags, iterations, Path::new("picture.exr")))
     }
 
     /// What is open.
@@ -439,7 +455,7 @@ impl Viewer {
         ui.input(|i| self.edits.pointer(i.time, i.pointer.any_pressed(), i.pointer.any_down()));
         files::poll(ui, self);
         if let Some(path) = self.reference.take() {
-            super::compare::load(ui, self, &path);
+            super::compare::load(self, &path);
         }
         self.look_at_reference(ui);
         super::keys::handle(ui, self);
@@ -484,7 +500,9 @@ impl Viewer {
             self.wanted.moving = true;
             ui.ctx().request_repaint_after_secs(0.03);
         }
-        if is_other_scene(&wanted, &self.wanted) || asks_anew {
+        if self.wanted.scene.is_none() {
+            self.timing.give_up();
+        } else if is_other_scene(&wanted, &self.wanted) || asks_anew {
             self.timing.ask(began, self.now.estimate);
         }
         self.engine.want(&self.wanted);
@@ -538,8 +556,9 @@ impl Viewer {
                     None => {
                         self.wanted.limits = self.limits.of_next(self.wanted.limits, settings);
                         self.wanted.limits_at_first = None;
-                        self.edits = Edits::new(settings.clone());
-                        self.wanted.settings = None;
+                        let returning = self.returning.take();
+                        self.wanted.settings = returning.as_ref().map(|edits| Arc::clone(edits.now()));
+                        self.edits = returning.unwrap_or_else(|| Edits::new(settings.clone()));
                         self.picture = PictureView::default();
                     }
                 }

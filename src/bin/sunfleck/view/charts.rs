@@ -18,7 +18,7 @@ pub fn rgba([r, g, b, _]: [u8; 4]) -> Color32 {
     Color32::from_rgb(r, g, b)
 }
 
-/// Colours from the least to the greatest value, with ticks.
+/// Colours from the least to the greatest value, with ticks; that of the greatest, if all are the same.
 pub fn bar(ui: &mut egui::Ui, name: &str, range: [f32; 2], log: bool, unit: &str, map: impl Fn(f32) -> Color32) {
     const STEPS: usize = 64;
     let font = FontId::proportional(11.0);
@@ -27,10 +27,12 @@ pub fn bar(ui: &mut egui::Ui, name: &str, range: [f32; 2], log: bool, unit: &str
     let label = format!("{name}: {} to {} {unit}", short(range[0]), short(range[1]));
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &label));
     let colors = Rect::from_min_size(rect.min, vec2(rect.width(), BAR));
+    let is_range = range[0] < range[1];
     let mut mesh = egui::Mesh::default();
     for i in 0..=STEPS {
         let t = i as f32 / STEPS as f32;
         let x = egui::lerp(colors.x_range(), t);
+        let t = if is_range { t } else { 1.0 };
         mesh.colored_vertex(pos2(x, colors.top()), map(t));
         mesh.colored_vertex(pos2(x, colors.bottom()), map(t));
         if i > 0 {
@@ -44,8 +46,10 @@ pub fn bar(ui: &mut egui::Ui, name: &str, range: [f32; 2], log: bool, unit: &str
     let ink = ui.visuals().text_color();
     painter.rect_stroke(colors, 0.0, Stroke::new(1.0, ui.visuals().weak_text_color()), egui::StrokeKind::Outside);
     let mut free_from = f32::NEG_INFINITY;
-    for tick in false_colour::ticks(range, log) {
-        let x = egui::lerp(colors.x_range(), place(tick, range, log).clamp(0.0, 1.0));
+    let ticks = if is_range { false_colour::ticks(range, log) } else { vec![range[0]] };
+    for tick in ticks {
+        let at = if is_range { place(tick, range, log).clamp(0.0, 1.0) } else { 0.5 };
+        let x = egui::lerp(colors.x_range(), at);
         painter.vline(x, colors.bottom()..=colors.bottom() + 3.0, Stroke::new(1.0, ink));
         let galley = painter.layout_no_wrap(short(tick), font.clone(), ink);
         let half = 0.5 * galley.size().x;

@@ -149,12 +149,13 @@ pub fn section(ui: &mut egui::Ui, viewer: &mut Viewer) {
             (pin.on_hover_text("The picture as it is now as the reference").clicked(), snapshot)
         {
             let name = format!("picture after {}", crate::progress::iterations(snapshot.film.n_iterations));
-            let reference = Reference { name, picture: snapshot.picture() };
-            viewer.engine().set_reference(Some(Arc::new(reference)));
+            let set = viewer.engine().choose_reference();
+            // Of a large one the copy takes longer than a frame.
+            std::thread::spawn(move || set(Some(Reference { name, picture: snapshot.picture() })));
         }
         let clear = ui.add_enabled(reference.is_some(), egui::Button::new("Clear"));
         if clear.on_hover_text("Without a reference again").clicked() {
-            viewer.engine().set_reference(None);
+            viewer.engine().choose_reference()(None);
         }
     });
     let Some(reference) = reference else {
@@ -347,13 +348,13 @@ fn name(painter: &egui::Painter, at: egui::Pos2, anchor: egui::Align2, text: &st
 }
 
 /// Reads a reference, on a thread of its own.
-pub fn load(_: &egui::Ui, viewer: &mut Viewer, path: &Path) {
-    let (path, set, say) = (path.to_owned(), viewer.engine().referee(), viewer.engine().speaker());
+pub fn load(viewer: &Viewer, path: &Path) {
+    let (path, set, say) = (path.to_owned(), viewer.engine().choose_reference(), viewer.engine().speaker());
     std::thread::spawn(move || match output::exr::read(&path) {
         Ok(picture) => {
             let name = files::name_of(&path).into_owned();
             say(Message::Said(format!("{name} is the reference")));
-            set(Reference { name, picture });
+            set(Some(Reference { name, picture }));
         }
         Err(error) => say(Message::Error(crate::one_line(&error.to_string()))),
     });

@@ -22,11 +22,12 @@ pub fn show(ui: &egui::Ui, viewer: &mut Viewer, area: egui::Rect) {
                 if ui.button("Try again").on_hover_text(again).clicked() {
                     viewer.retry();
                 }
-                let save = ui.add_enabled(viewer.now.snapshot.is_some(), egui::Button::new("Save picture …"));
+                let has_picture = viewer.now.snapshot.as_ref().is_some_and(|snapshot| !snapshot.is_preview);
+                let save = ui.add_enabled(has_picture, egui::Button::new("Save picture …"));
                 if save.on_hover_text("The last picture that was shown (Ctrl+S)").clicked() {
                     files::save(viewer);
                 }
-                if let Some(previous) = viewer.previous.clone() {
+                if let Some((previous, _)) = &viewer.previous {
                     let back = ui.button("Back").on_hover_text(format!("To {}", previous.name));
                     if back.clicked() {
                         viewer.back();

@@ -71,7 +71,7 @@ fn poll_dialog(ui: &egui::Ui, viewer: &mut Viewer) {
             Err(why) => viewer.say(ui, Message::Error(why)),
         },
         Purpose::SaveSettings => save_settings(ui, viewer, &path),
-        Purpose::Reference => super::compare::load(ui, viewer, &path),
+        Purpose::Reference => super::compare::load(viewer, &path),
         Purpose::Environment => read_environment(ui, viewer, &path),
     }
 }
@@ -160,7 +160,7 @@ pub fn dropped(ui: &egui::Ui, viewer: &mut Viewer, paths: &[PathBuf]) {
     let (environments, rest): (Vec<_>, Vec<_>) = rest.into_iter().partition(|path| is(path, &["hdr"]));
     let (scenes, unknown): (Vec<_>, Vec<_>) = rest.into_iter().partition(|path| is(path, SCENES));
     if let Some(path) = references.first() {
-        super::compare::load(ui, viewer, path);
+        super::compare::load(viewer, path);
     }
     let environment = environments.first().map(|path| path.as_path());
     match (scenes.first(), environment) {
@@ -197,11 +197,15 @@ fn save_settings(ui: &egui::Ui, viewer: &mut Viewer, path: &Path) {
     }
     let Some(text) = viewer.settings_text(path) else { return };
     let written = sunfleck::output::atomic::write(path, |writer| io::Write::write_all(writer, text.as_bytes()));
-    let message = match written {
-        Ok(()) => Message::Said(format!("saved {}", path.display())),
-        Err(error) => Message::Error(error.to_string()),
-    };
-    viewer.say(ui, message);
+    if let Err(error) = written {
+        return viewer.say(ui, Message::Error(error.to_string()));
+    }
+    viewer.say(ui, Message::Said(format!("saved {}", path.display())));
+    // What is reset, and what a command has to say, is against what the file says now.
+    let is_it = |opened: &&Arc<Opened>| crate::scenes::same_file(Path::new(&opened.source.name), path);
+    if let Some(Err(error)) = viewer.opened().filter(is_it).map(|opened| opened.read_settings_again()) {
+        viewer.say(ui, Message::Error(crate::one_line(&crate::chain(&error))));
+    }
 }
 
 pub fn copy_command(ui: &egui::Ui, viewer: &mut Viewer) {

@@ -81,6 +81,11 @@ impl PictureView {
         self.rig = None;
     }
 
+    /// Whatever moved: in a window with another clock it would rest when that has come as far.
+    pub fn rest(&mut self) {
+        self.moved = None;
+    }
+
     fn take(&mut self, ctx: &egui::Context, painted: &Arc<Painted>) {
         if self.painted.as_ref().is_some_and(|now| Arc::ptr_eq(now, painted)) {
             return;
@@ -347,7 +352,8 @@ impl Viewer {
                 None => {
                     let opened = self.opened()?;
                     let axis = opened.loaded.scene.cameras.first().map_or(Vec3::Y, Camera::up_axis);
-                    let says_focus = opened.read.camera.as_ref().is_some_and(|camera| camera.focus_distance.is_some());
+                    let says_focus =
+                        opened.read().camera.as_ref().is_some_and(|camera| camera.focus_distance.is_some());
                     Rig::new(&camera, bounds).turning_about(axis).focused(says_focus)
                 }
             };

@@ -25,6 +25,11 @@ impl Timing {
         self.asked.get_or_insert((now, estimate));
     }
 
+    /// Nothing is asked for any more.
+    pub fn give_up(&mut self) {
+        self.asked = None;
+    }
+
     /// A picture of `estimate` is shown.
     pub fn see(&mut self, now: Instant, estimate: u64) {
         if let Some((when, _)) = self.asked.take_if(|(_, before)| estimate > *before) {
@@ -91,6 +96,11 @@ mod tests {
         timing.ask(at(7), 3);
         timing.see(at(20), 4);
         timing.see(at(30), 5);
-        assert_eq!(timing.waits, [Duration::from_millis(20)]);
+        // Nobody waits while no scene is open.
+        timing.ask(at(40), 5);
+        timing.give_up();
+        timing.ask(at(90), 5);
+        timing.see(at(100), 6);
+        assert_eq!(timing.waits, [20, 10].map(Duration::from_millis));
     }
 }

@@ -121,14 +121,14 @@ pub enum Phase {
 }
 
 /// What was read.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Opened {
     /// What asked for it.
     pub choice: Arc<Choice>,
     /// With the settings that it was opened with.
     pub source: Source,
-    /// The settings as their file has them.
-    pub read: Settings,
+    /// The settings as their file has them now.
+    read: Mutex<Arc<Settings>>,
     /// As the file has it, before settings; the default camera is added if it has none.
     pub loaded: Loaded,
     /// Least and greatest corner of the scene and of the spheres that its settings add, without what lies far outside
@@ -139,6 +139,18 @@ pub struct Opened {
 }
 
 impl Opened {
+    /// The settings as their file has them.
+    pub fn read(&self) -> Arc<Settings> {
+        Arc::clone(&self.read.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Takes what the file says, after it was written.
+    pub fn read_settings_again(&self) -> Result<()> {
+        let now = Source::resolve(&self.choice.name)?.settings;
+        *self.read.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(now);
+        Ok(())
+    }
+
     /// The material called as the one of that index was in a version before.
     pub fn material_as(&self, before: &Self, index: usize) -> Option<usize> {
         let name = &before.loaded.scene.materials.get(index)?.name;
@@ -157,8 +169,15 @@ impl Opened {
         iterations: u32,
         output: &Path,
     ) -> String {
+        let read = self.read();
+        // So many iterations, however long they take.
+        let unlimited = |settings: &Settings| Settings { iterations: None, seconds: None, ..settings.clone() };
+        let mut pairs = unlimited(settings).difference(&unlimited(&read));
+        if read.seconds.is_some() {
+            pairs.push("seconds=".to_owned());
+        }
         let mut command = format!("sunfleck render {}", crate::render::quote(scene));
-        for pair in settings.difference(&self.read) {
+        for pair in pairs {
             command += &format!(" --set {}", crate::render::quote(&pair));
         }
         let output = crate::render::quote(&output.to_string_lossy());
@@ -189,6 +208,8 @@ struct Board {
     /// To be written.
     saves: Vec<Save>,
     reference: Option<Arc<Reference>>,
+    /// Counts choices of a reference, and is the number of the one that is there.
+    references: [u64; 2],
     /// Of a picture that the window can show, pixels.
     most_side: Option<usize>,
     quit: bool,
@@ -390,22 +411,25 @@ impl Engine {
         self.shared.board().most_side = Some(most_side);
     }
 
-    /// What errors are measured against, and pictures compared with.
-    pub fn set_reference(&self, reference: Option<Arc<Reference>>) {
-        let mut board = self.shared.board();
-        board.history.against_reference.clear();
-        board.reference = reference;
-        self.shared.changed.notify_all();
-    }
-
-    /// What other threads set it with.
-    pub fn referee(&self) -> impl Fn(Reference) + Send + 'static {
+    /// Chooses what errors are measured against, and pictures compared with: it is set when it is there, from any thread, unless
+    /// one that was chosen later is there before.
+    pub fn choose_reference(&self) -> impl FnOnce(Option<Reference>) + Send + 'static {
         let shared = Arc::clone(&self.shared);
+        let number = shared.note(|board| {
+            board.references[0] += 1;
+            board.references[0]
+        });
         move |reference| {
-            shared.update(|board| {
+            // Freed here, and not while others wait for the board.
+            drop(shared.update(|board| {
+                let [_, there] = &mut board.references;
+                if number < *there {
+                    return None;
+                }
+                *there = number;
                 board.history.against_reference.clear();
-                board.reference = Some(Arc::new(reference));
-            });
+                std::mem::replace(&mut board.reference, reference.map(Arc::new))
+            }));
         }
     }
 

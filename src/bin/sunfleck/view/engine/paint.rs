@@ -1,6 +1,6 @@
 //! From a film to what the window shows.
 
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 use anyhow::Result;
 use eframe::egui::ColorImage;
@@ -271,6 +271,14 @@ pub struct Painter {
     exposure: Option<f32>,
     hits: Option<(Arc<Snapshot>, FirstHits)>,
     reference: Option<ReferenceImage>,
+    measured: Option<AgainstReference>,
+}
+
+/// How far a film is from a reference.
+struct AgainstReference {
+    film: Weak<Snapshot>,
+    reference: Weak<Reference>,
+    difference: Result<Difference, String>,
 }
 
 /// A reference as it is shown.
@@ -291,7 +299,7 @@ impl Painter {
     /// Error estimated from the halves, and measured against the reference, or why it cannot be.
     pub fn measure(
         &mut self,
-        snapshot: &Snapshot,
+        snapshot: &Arc<Snapshot>,
         reference: Option<&Arc<Reference>>,
     ) -> (Option<f64>, Option<Result<Difference, String>>) {
         // What another scene left would keep that scene in memory.
@@ -303,8 +311,22 @@ impl Painter {
             self.halves = (snapshot.estimate, Halves::default());
         }
         self.halves.1.add(&snapshot.film);
-        let measured = fitting(reference, snapshot).map(|r| compare(&snapshot.picture(), &r.picture));
+        let measured = fitting(reference, snapshot).map(|reference| self.difference(snapshot, reference));
         (self.halves.1.rel_mse(), measured)
+    }
+
+    /// Once for each film: it is painted again for every change of its look.
+    fn difference(&mut self, snapshot: &Arc<Snapshot>, reference: &Arc<Reference>) -> Result<Difference, String> {
+        let is_it = |of: &&AgainstReference| {
+            (of.film.as_ptr(), of.reference.as_ptr()) == (Arc::as_ptr(snapshot), Arc::as_ptr(reference))
+        };
+        if let Some(of) = self.measured.as_ref().filter(is_it) {
+            return of.difference.clone();
+        }
+        let difference = compare(&snapshot.picture(), &reference.picture);
+        let (film, reference) = (Arc::downgrade(snapshot), Arc::downgrade(reference));
+        self.measured = Some(AgainstReference { film, reference, difference: difference.clone() });
+        difference
     }
 
     pub fn paint(

@@ -170,7 +170,8 @@ impl Task {
 fn publish(board: &mut Board, task: &Task, painted: Arc<Painted>, estimated: Option<f64>) {
     let figures = painted.figures;
     let snapshot = &task.snapshot;
-    if board.snapshot.is_some() {
+    // Or the scene was left.
+    if board.snapshot.as_ref().is_some_and(|now| Arc::ptr_eq(&now.opened, &snapshot.opened)) {
         board.painted = Some(painted);
     }
     if snapshot.estimate != board.estimate || snapshot.is_preview {

@@ -85,6 +85,7 @@ pub fn open(choice: &Arc<Choice>, on_host: bool, interrupt: &Interrupt) -> Resul
     let is_closed = !has_camera && is_inside;
     // Of one that cannot be rendered as it is, nothing: whoever tries is told why.
     let packed = pack(&source, &loaded, on_host, interrupt).unwrap_or_default();
+    let read = Mutex::new(Arc::new(read));
     Ok((Opened { choice: Arc::clone(choice), source, read, loaded, bounds, is_closed }, packed))
 }
 

@@ -35,7 +35,7 @@ impl Save {
         let is_of = |snapshot: &&Arc<Snapshot>| Some(&snapshot.opened.choice) == self.scene.as_ref();
         let snapshot = board.snapshot.as_ref().filter(is_of).filter(|_| board.phase != Phase::Loading || board.quit);
         let has_failed = matches!(board.phase, Phase::Failed(_));
-        match snapshot.filter(|snapshot| !snapshot.is_preview || has_failed) {
+        match snapshot.filter(|snapshot| !snapshot.is_preview) {
             Some(snapshot) => Some(Ok(Arc::clone(snapshot))),
             None if has_failed || board.quit || self.scene.is_none() => Some(Err("there is no picture yet")),
             None => None,

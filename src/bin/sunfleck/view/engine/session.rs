@@ -136,6 +136,8 @@ pub struct Session {
     /// None before the pilot.
     radii: Option<Arc<FirstRadii>>,
     split: Split,
+    /// The last iteration that is in it.
+    split_last: u32,
     first_radius: f32,
     mean_first_radius: Option<f32>,
     /// Done in this estimate.
@@ -175,6 +177,7 @@ impl Session {
             is_preview: false,
             radii: None,
             split: Split::default(),
+            split_last: 0,
             first_radius: 0.0,
             mean_first_radius: None,
             n_iterations: 0,
@@ -213,7 +216,7 @@ impl Session {
         (self.estimate, self.is_preview) = (estimate, is_preview);
         (self.n_iterations, self.seconds, self.is_whole, self.shown) = (0, 0.0, false, None);
         self.times = StageTimes::default();
-        (self.split, self.radii) = (Split::default(), None);
+        (self.split, self.split_last, self.radii) = (Split::default(), 0, None);
         Ok(())
     }
 
@@ -325,10 +328,11 @@ impl Session {
         let iteration = inspect::Iteration::new(&self.scene, &frame, &vertices, radii, &photons);
         let interrupt = self.stages.interrupt();
         let nodes_visited = needs.nodes_visited.then(|| iteration.nodes_visited(interrupt)).transpose()?;
-        let split = needs.split.then(|| iteration.split(interrupt)).transpose()?.map(|split| {
-            self.split.add(&split);
-            self.split.clone()
-        });
+        if needs.split && self.split_last != self.n_iterations {
+            self.split.add(&iteration.split(interrupt)?);
+            self.split_last = self.n_iterations;
+        }
+        let split = needs.split.then(|| self.split.clone());
         Ok(Insides { photons, split, nodes_visited })
     }
 
@@ -415,11 +419,17 @@ pub mod tests {
             assert_eq!(has, Needs { photons: needs.is_any(), ..needs });
             assert!(!session.owes(needs) && !session.owes(NOTHING), "{needs:?}");
         }
-        assert_eq!(session.split.n_iterations, 1);
+        // An iteration is in the mean of its light once, however often it is looked at.
+        let split = |snapshot: Option<Snapshot>| snapshot.unwrap().insides.as_ref().unwrap().split.clone().unwrap();
+        let first = split(session.snapshot_if_due(true, SPLIT).unwrap());
+        assert_eq!((first.n_iterations, &first), (1, &session.split));
+        session.iterate().unwrap();
+        assert_eq!(split(session.snapshot_if_due(true, SPLIT).unwrap()).n_iterations, 2);
         // What gathers again can be left.
+        session.iterate().unwrap();
         is_unwanted.store(true, Ordering::Relaxed);
         assert!(matches!(session.snapshot_if_due(true, SPLIT), Err(Error::Interrupted)));
-        assert!(session.snapshot_if_due(true, PHOTONS).unwrap().is_none());
-        assert_eq!(session.split.n_iterations, 1);
+        assert!(session.snapshot_if_due(true, PHOTONS).unwrap().is_some());
+        assert_eq!(session.split.n_iterations, 2);
     }
 }

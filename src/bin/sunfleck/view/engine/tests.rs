@@ -221,6 +221,40 @@ fn a_preview_is_not_saved_for_the_picture() {
     bench.send();
     bench.wait("saving", |_| path.exists());
     assert_eq!(exr::read(&path).unwrap().size, [32, 32]);
+    // Not after a failure either.
+    bench.wanted.moving = true;
+    bench.wait_for_film(&Phase::Reached, 2);
+    bench.send();
+    bench.wait("a preview", |now| now.snapshot.as_ref().is_some_and(|snapshot| snapshot.is_preview));
+    bench.set(no_such_camera);
+    bench.wait("the error", |now| matches!(now.phase, Phase::Failed(_)));
+    assert!(matches!(bench.save(&folder.path().join("b.exr")), Message::Error(why) if why.contains("no picture yet")));
+}
+
+fn no_such_camera(settings: &mut Settings) {
+    settings.camera = Some(CameraSettings { name: Some("no such".to_owned()), ..Default::default() });
+}
+
+/// A large one is read slowly.
+#[test]
+fn the_reference_that_was_chosen_last_stays() {
+    let bench = Bench::open("cornell", until(1));
+    let reference = |name: &str| {
+        let picture = Picture { size: [1; 2], crop: [0, 0, 1, 1], rgb: vec![[1.0; 3]], variance: None };
+        Some(Reference { name: name.to_owned(), picture })
+    };
+    let name = || bench.engine.now().reference.map(|reference| reference.name.clone());
+    let (first, second, third) =
+        (bench.engine.choose_reference(), bench.engine.choose_reference(), bench.engine.choose_reference());
+    first(reference("first"));
+    assert_eq!(name().as_deref(), Some("first"));
+    third(reference("third"));
+    second(reference("second"));
+    assert_eq!(name().as_deref(), Some("third"));
+    let late = bench.engine.choose_reference();
+    bench.engine.choose_reference()(None);
+    late(reference("late"));
+    assert_eq!(name(), None);
 }
 
 #[test]
@@ -236,6 +270,20 @@ fn pauses_steps_and_limits_count_exactly() {
     bench.wanted.steps += 3;
     bench.send();
     bench.wait_for_film(&Phase::Paused, 7);
+    // Steps that were not done when it went on are not done after another pause.
+    let gate = Arc::clone(&bench.gate);
+    let held = gate.held.lock().unwrap();
+    bench.wanted.steps += 1;
+    bench.send();
+    bench.wait("the render thread", |_| bench.gate.is_reached.load(Ordering::Relaxed));
+    bench.wanted.steps += 4;
+    (bench.wanted.paused, bench.wanted.limits) = (false, until(9));
+    bench.send();
+    drop(held);
+    bench.wait_for_film(&Phase::Reached, 9);
+    bench.wanted.paused = true;
+    bench.send();
+    bench.wait_for_film(&Phase::Paused, 9);
     // A restart in a pause shows the first picture of it.
     bench.wanted.restarts += 1;
     bench.send();
@@ -333,15 +381,16 @@ fn what_fails_can_be_put_right() {
     bench.send();
     let good = bench.wait_for_film(&Phase::Reached, 2);
     // Settings that cannot be: the last film stays, and can be saved.
-    bench.set(|settings| {
-        settings.camera = Some(CameraSettings { name: Some("no such".to_owned()), ..Default::default() })
-    });
+    bench.set(no_such_camera);
     let bad = bench.wait("the error", |now| matches!(&now.phase, Phase::Failed(text) if text.contains("no such")));
     assert_eq!(iterations(&bad), Some(2));
     assert!(matches!(bench.save(&folder.path().join("a.exr")), Message::Said(_)));
     bench.set(|settings| settings.camera = None);
     let again = bench.wait("the picture", |now| now.phase == Phase::Reached && now.estimate > good.estimate);
-    assert_eq!(again.snapshot.unwrap().film, good.snapshot.unwrap().film);
+    let [again, good] = [again, good].map(|now| now.snapshot.unwrap());
+    assert_eq!(again.film, good.film);
+    // Not packed again for it.
+    assert!(Arc::ptr_eq(&again.scene.nodes, &good.scene.nodes));
     // A scene that is not there, and back.
     bench.wanted.settings = None;
     bench.choose("no/such.glb", &[]);

@@ -22,8 +22,8 @@ struct Have {
     reader: Reader,
     session: Option<Session>,
     opened: Option<Arc<Opened>>,
-    /// That scene, for the first session of it; empty after.
-    packed: PackedScene,
+    /// That scene, for the next session of it; empty while there is one.
+    packed: Arc<PackedScene>,
     estimate: u64,
     steps_done: u32,
 }
@@ -108,13 +108,10 @@ impl Have {
         let reads = is_other_scene(&self.wanted, wanted) || is_retry && self.opened.is_none();
         let is_stale = self.is_stale(wanted);
         let before = std::mem::replace(&mut self.wanted, wanted.clone());
-        if is_retry {
-            device.recover()?;
-        }
         if reads {
             // The memory of the device first; of a scene that is read again the picture stays, for the file may be broken.
             let opened_before = self.opened.take();
-            (self.session, self.packed) = (None, PackedScene::default());
+            (self.session, self.packed) = (None, Arc::default());
             let stays = wanted.reads_again && before.scene == wanted.scene;
             // Freed here, and not while others wait for the board.
             drop(shared.update(|board| {
@@ -129,7 +126,7 @@ impl Have {
                 return Ok(());
             };
             let opened = Arc::new(opened);
-            self.packed = packed;
+            self.packed = Arc::new(packed);
             self.opened = Some(Arc::clone(&opened));
             // As the interface will, when it sees the file.
             let mut wanted = wanted.clone();
@@ -202,22 +199,24 @@ impl Have {
                 let warnings: Vec<_> = input.warnings.iter().filter(is_new).cloned().map(Message::Warning).collect();
                 let can_follow = device.can_follow(&settings);
                 // Of another device the memory first.
-                let (session, before) = match self.session.take() {
-                    Some(session) if can_follow => (Some(session), Arc::default()),
-                    Some(session) => (None, session.into_scene()),
-                    None => (None, Arc::new(std::mem::take(&mut self.packed))),
-                };
+                if !can_follow {
+                    self.end_session();
+                }
                 device.follow(&settings)?;
                 let settings = Arc::new(settings);
-                let session = match session {
-                    Some(mut session) => session.change(device, settings, input).map(|()| session)?,
-                    None => Session::new(device, opened, settings, input, &before, shared.interrupt())?,
-                };
+                match &mut self.session {
+                    Some(session) => session.change(device, settings, input)?,
+                    None => {
+                        device.recover()?;
+                        let (before, interrupt) = (Arc::clone(&self.packed), shared.interrupt());
+                        self.session = Some(Session::new(device, opened, settings, input, &before, interrupt)?);
+                        self.packed = Arc::default();
+                    }
+                }
                 shared.update(|board| {
                     board.messages.extend(warnings);
-                    board.device.clone_from(&session.machine.device);
+                    board.device = self.session.as_ref().map_or(String::new(), |s| s.machine.device.clone());
                 });
-                self.session = Some(session);
             }
         }
         self.restart(shared, wanted)
@@ -260,9 +259,8 @@ impl Have {
             let board = shared.board();
             (board.noise(), Wanted { paused: board.wanted.paused, steps: board.wanted.steps, ..wanted.clone() })
         };
-        if wanted.paused {
-            self.steps_done = (self.steps_done + 1).min(wanted.steps);
-        }
+        // Steps that were not done before it went on are not done after a later pause.
+        self.steps_done = if wanted.paused { (self.steps_done + 1).min(wanted.steps) } else { wanted.steps };
         shared.note(|board| board.history.records.push(record));
         self.show(shared, &wanted, !self.can_go_on(&wanted, noise))
     }
@@ -296,9 +294,16 @@ impl Have {
         Ok(())
     }
 
+    /// Gives the memory of the device back, and keeps the scene for the next session of it.
+    fn end_session(&mut self) {
+        if let Some(session) = self.session.take() {
+            self.packed = session.into_scene();
+        }
+    }
+
     /// The film so far stays on view, and can be saved.
     fn fail(&mut self, shared: &Shared, text: String) {
-        self.session = None;
+        self.end_session();
         shared.update(|board| {
             board.work = None;
             board.phase = Phase::Failed(text);

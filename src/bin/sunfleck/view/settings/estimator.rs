@@ -113,7 +113,7 @@ impl Viewer {
     /// Photons emitted an iteration, times a factor.
     pub fn scale_photons(&mut self, ui: &Ui, factor: f64) {
         let Some(opened) = self.opened().cloned() else { return };
-        let said = photons_of(&self.settings(), &opened.read);
+        let said = photons_of(&self.settings(), &opened.read());
         let photons = said.saying(Count((factor * f64::from(said.value().0)).max(1.0) as u32));
         self.edit(ui, PHOTONS.name, |s| s.photons = photons);
     }

@@ -56,7 +56,7 @@ impl Viewer {
     /// The next of the tone curves, after the last the first.
     pub fn next_tone(&mut self, ui: &Ui) {
         let Some(opened) = self.opened().cloned() else { return };
-        let said = tone_of(&self.settings(), &opened.read);
+        let said = tone_of(&self.settings(), &opened.read());
         let at = TONES.iter().position(|(tone, ..)| *tone == said.value()).map_or(0, |at| at + 1);
         let next = said.saying(TONES[at % TONES.len()].0);
         self.edit(ui, TONE.name, |s| s.tonemap = next);

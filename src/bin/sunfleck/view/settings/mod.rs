@@ -32,7 +32,7 @@ const GROUPS: [(&str, &str, bool, Group); 6] = [
 
 pub fn show(ui: &mut Ui, viewer: &mut Viewer) {
     let Some(opened) = viewer.opened().cloned() else { return };
-    let read = &opened.read;
+    let read = &*opened.read();
     ui.add_space(4.0);
     ui.horizontal(|ui| {
         ui.strong("Settings");

@@ -18,8 +18,10 @@ use crate::view::engine::{Comparison, Painted, Reference, View};
 fn compared(window: &mut Window, change: impl FnOnce(&mut Picture)) -> Arc<Painted> {
     let mut picture = window.viewer().now.snapshot.as_ref().unwrap().picture();
     change(&mut picture);
-    let reference = Arc::new(Reference { name: "changed.exr".into(), picture });
-    window.viewer().engine().set_reference(Some(Arc::clone(&reference)));
+    let name = "changed.exr".to_owned();
+    window.viewer().engine().choose_reference()(Some(Reference { name, picture }));
+    window.step();
+    let reference = window.viewer().now.reference.clone().unwrap();
     window.viewer().wanted.painting.comparison = Comparison::Flip;
     window.wait("comparison", |viewer| {
         viewer.picture.painted().is_some_and(|painted| {

@@ -3,13 +3,16 @@
 use std::path::Path;
 use std::time::Duration;
 
+use clap::Parser;
 use eframe::egui;
 use egui::{Event, Key, Modifiers, Role, ViewportCommand};
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT, Queryable};
 use sunfleck::output::difference::Measure;
-use sunfleck::scene::settings::Count;
+use sunfleck::scene::settings::{Count, EnvironmentSettings, Settings};
 
 use super::{NoPixels, Window};
+use crate::cli::{Cli, Command};
+use crate::job::Job;
 use crate::view::app::Place;
 use crate::view::dialog::Answer;
 use crate::view::engine::{Comparison, Limits, Phase, View, is_same};
@@ -156,7 +159,7 @@ fn what_is_changed_by_hand_outlives_a_file_that_is_read_again() {
     window.viewer().edit_at(27.0, "alpha", |s| s.alpha = Some(0.6));
     std::fs::write(&file, OWN.replace("0.6", "0.8").replace("200", "300")).unwrap();
     window.press(Modifiers::COMMAND, Key::R);
-    window.wait("the file as it is now", |viewer| viewer.opened().is_some_and(|o| o.read.alpha == Some(0.8)));
+    window.wait("the file as it is now", |viewer| viewer.opened().is_some_and(|o| o.read().alpha == Some(0.8)));
     window.wait_for_picture();
     let now = window.viewer().edits.now().clone();
     assert_eq!((now.alpha, now.photons, now.seed, now.exposure), (Some(0.8), Some(Count(300)), Some(5), Some(1.5)));
@@ -240,6 +243,65 @@ fn a_broken_file_leaves_the_picture() {
         window.press(Modifiers::COMMAND, Key::R);
         window.wait_for_picture();
     }
+}
+
+/// What a command says, and what is reset, is against what the file says now.
+#[test]
+fn settings_are_saved_over_the_file_they_are_from() {
+    let (mut window, file) = with_file(&format!("{OWN}exposure = 1.0\nseconds = 1000.0\niterations = 3\n"));
+    let settings_of = |command: &str| {
+        let Some(Command::Render(args)) = Cli::parse_from(command.split(' ')).command else { panic!("{command}") };
+        let job = Job::resolve(&args).unwrap();
+        assert_eq!((job.budget.iterations, job.budget.seconds), (Some(3), None), "{command}");
+        Settings { iterations: Some(Count(3)), seconds: Some(1000.0), ..job.source.settings }
+    };
+    window.viewer().edit_at(0.0, "exposure", |s| s.exposure = None);
+    window.viewer().edit_at(9.0, "seed", |s| s.seed = Some(5));
+    window.wait_for_picture();
+    let command = |window: &mut Window| window.viewer().command().unwrap();
+    let before = command(&mut window);
+    assert!(before.contains("--set exposure= ") && before.contains("--set seed=5 "), "{before}");
+    assert_eq!(settings_of(&before), **window.viewer().edits.now());
+    let place = file.clone();
+    window.viewer().pick = std::sync::Arc::new(move |_| Answer::File(place.clone()));
+    crate::view::files::ask_settings(window.viewer());
+    window.wait_for_message("saved ");
+    let after = command(&mut window);
+    assert!(!after.contains("exposure") && !after.contains("seed"), "{after}");
+    assert_eq!(settings_of(&after).seed, Some(5));
+    assert!(window.harness.get_by_label("Reset all").accesskit_node().is_disabled());
+}
+
+/// A file that cannot be read costs the scene before it its picture, not what was changed about it.
+#[test]
+fn the_way_back_from_a_broken_file_keeps_what_was_edited() {
+    let (mut window, _) = with_file(OWN);
+    window.viewer().edit_at(0.0, "seed", |s| s.seed = Some(5));
+    window.viewer().edit_at(9.0, "alpha", |s| s.alpha = Some(0.7));
+    window.viewer().open("no such scene");
+    window.wait("failure", |viewer| matches!(viewer.now.phase, Phase::Failed(_)));
+    window.steps(3);
+    window.click("Back");
+    window.wait_for_picture();
+    let settings = window.viewer().now.snapshot.as_ref().unwrap().settings.clone();
+    assert_eq!((settings.seed, settings.alpha), (Some(5), Some(0.7)));
+    window.press(Modifiers::COMMAND, Key::Z);
+    assert_eq!((window.viewer().edits.now().seed, window.viewer().edits.now().alpha), (Some(5), Some(0.6)));
+}
+
+/// A command may be run in another folder.
+#[test]
+fn a_copied_command_names_files_from_the_root() {
+    let mut window = Window::with_picture();
+    let sky = || Some(EnvironmentSettings { file: Some("sky.hdr".to_owned()), ..Default::default() });
+    window.viewer().edit_at(0.0, "environment", |s| s.environment = sky());
+    let command = window.viewer().command().unwrap();
+    let there = std::path::absolute("sky.hdr").unwrap();
+    assert!(command.contains(&format!("environment.file={}", there.display())), "{command}");
+    // Beside a settings file it is named from that.
+    let (mut window, _) = with_file(OWN);
+    window.viewer().edit_at(0.0, "environment", |s| s.environment = sky());
+    assert!(window.viewer().command().unwrap().contains("environment.file=sky.hdr"));
 }
 
 /// `-o` names a place for the scene it is given with, not for one that is opened later.

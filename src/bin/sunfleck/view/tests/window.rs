@@ -179,11 +179,14 @@ fn loses_its_device() {
     let mut onlooker = look_on(Some(renderer), 0);
     window::run(&mut viewer, &bell, options, &mut onlooker).unwrap();
     assert!(matches!(viewer.now.phase, Phase::Failed(_)) && viewer.picture.painted().is_some());
-    viewer.retry();
+    // An edit does so, too. What moved by the clock of the window before does not move in the next.
+    viewer.edit_at(1e6, "seed", |settings| settings.seed = Some(7));
+    viewer.picture.move_on(1e6);
     viewer.remembered.show_convergence = true;
     window::run(&mut viewer, &bell, options, &mut look_on(None, onlooker.estimate)).unwrap();
 
     // The window's, twice: what was rendered is kept, and grows.
+    assert!(viewer.now.snapshot.as_ref().is_some_and(|snapshot| !snapshot.is_preview));
     let mut vandal = Vandal::new(When::BetweenFrames, 2, FEWEST_FRAMES);
     window::run(&mut viewer, &bell, options, &mut vandal).unwrap();
     let ((estimate, before), (same, after)) = (vandal.before.unwrap(), vandal.after_all.unwrap());
