@@ -113,6 +113,8 @@ struct SceneInfo {
     pad0: u32,
     environment_scale: vec3<f32>,
     pad1: u32,
+    subject_centre: vec3<f32>,
+    subject_radius: f32,
 }
 
 struct Camera {

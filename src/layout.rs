@@ -225,6 +225,10 @@ pub struct SceneInfo {
     pub environment_scale: [f32; 3],
     /// Zero.
     pub pad1: u32,
+    /// Centre of a sphere about what a picture is of, if the rest is much larger, metres.
+    pub subject_centre: [f32; 3],
+    /// Its radius, metres; 0: there is none.
+    pub subject_radius: f32,
 }
 
 /// The camera; rows of world-from-camera.

@@ -278,7 +278,6 @@ fn light_emit(u: vec3<f32>, v: vec3<f32>) -> Emission {
     }
     let light = light_at(light_choose(u.x));
     let chosen = 1.0 / light.probability;
-    let disc = PI * scene_info.radius * scene_info.radius;
     switch light.kind {
         case LIGHT_AREA: {
             let p = primitives[light.primitive];
@@ -304,23 +303,51 @@ fn light_emit(u: vec3<f32>, v: vec3<f32>) -> Emission {
             return Emission(light.position, direction, power, max_element(power) > 0.0);
         }
         case LIGHT_DIRECTIONAL: {
-            let power = light.intensity * (disc * chosen);
-            return Emission(light_on_disc(light.direction, u.yz), light.direction, power, true);
+            let place = light_on_disc(light.direction, u.yz);
+            return Emission(place.xyz, light.direction, light.intensity * (place.w * chosen), true);
         }
         default: {
             let found = light_sample_environment(v.xy);
             if found.w <= 0.0 {
                 return NO_EMISSION;
             }
-            let power = light_environment(found.xyz) * (disc * chosen / found.w);
-            return Emission(light_on_disc(-found.xyz, u.yz), -found.xyz, power, true);
+            let place = light_on_disc(-found.xyz, u.yz);
+            let power = light_environment(found.xyz) * (place.w * chosen / found.w);
+            return Emission(place.xyz, -found.xyz, power, true);
         }
     }
 }
 
-// On the disc that the scene's bounding sphere shows to light travelling along `direction`, before the scene.
-fn light_on_disc(direction: vec3<f32>, u: vec2<f32>) -> vec3<f32> {
-    let p = warp_disc(u) * scene_info.radius;
+// On the disc that the scene's bounding sphere shows to light travelling along `direction`, before the scene; and one over
+// the density of that place, m². Half of the photons lie about the subject, if it is a speck in the scene.
+fn light_on_disc(direction: vec3<f32>, u: vec2<f32>) -> vec4<f32> {
+    let radius = scene_info.radius;
+    let subject_radius = scene_info.subject_radius;
     let basis = basis_around(direction);
-    return scene_info.centre + basis.x * p.x + basis.y * p.y - direction * scene_info.radius;
+    let before = scene_info.centre - direction * radius;
+    if subject_radius == 0.0 {
+        let p = warp_disc(u) * radius;
+        return vec4(before + basis.x * p.x + basis.y * p.y, PI * radius * radius);
+    }
+    let to = scene_info.subject_centre - scene_info.centre;
+    let middle = vec2(dot(to, basis.x), dot(to, basis.y));
+    let octaves = log(radius / subject_radius);
+    // Of those about it, the share within its radius: then their density does not leap there.
+    let share = 1.0 / (1.0 + 2.0 * octaves);
+    let is_about = u.x < 0.5;
+    let unit = warp_disc(vec2(2.0 * u.x - select(1.0, 0.0, is_about), u.y));
+    var p = unit * radius;
+    if is_about {
+        let t = dot(unit, unit);
+        var distance = subject_radius * sqrt(t / share);
+        if t >= share {
+            distance = subject_radius * exp((t - share) / (1.0 - share) * octaves);
+        }
+        p = middle + unit * select(0.0, distance / sqrt(t), t > 0.0);
+    }
+    let from_middle = max(length(p - middle), subject_radius);
+    // Rounding puts no sample outside of where it is from.
+    let about = select(0.0, share / (from_middle * from_middle), is_about || from_middle <= radius);
+    let evenly = select(0.0, 1.0 / (radius * radius), !is_about || length(p) <= radius);
+    return vec4(before + basis.x * p.x + basis.y * p.y, TAU / (about + evenly));
 }

@@ -269,24 +269,52 @@ pub fn emit(scene: &PackedScene, u: [f32; 3], v: [f32; 3]) -> Option<Emission> {
         }
         LIGHT_DIRECTIONAL => {
             let direction = Vec3::from(light.direction);
-            let power = Vec3::from(light.intensity) * (PI * scene.info.radius * scene.info.radius * chosen);
-            Some(Emission { origin: on_disc(scene, direction, square), direction, power })
+            let (origin, area) = on_disc(scene, direction, square);
+            Some(Emission { origin, direction, power: Vec3::from(light.intensity) * (area * chosen) })
         }
         _ => {
             let (from, pdf) = sample_environment(scene, angle);
             if pdf <= 0.0 {
                 return None;
             }
-            let disc = PI * scene.info.radius * scene.info.radius;
-            let power = environment(scene, from) * (disc * chosen / pdf);
-            Some(Emission { origin: on_disc(scene, -from, square), direction: -from, power })
+            let (origin, area) = on_disc(scene, -from, square);
+            let power = environment(scene, from) * (area * chosen / pdf);
+            Some(Emission { origin, direction: -from, power })
         }
     }
 }
 
-/// On the disc that the scene's bounding sphere shows to light travelling along `direction`, before the scene.
-fn on_disc(scene: &PackedScene, direction: Vec3, u: [f32; 2]) -> Vec3 {
-    let p = warp::disc(u) * scene.info.radius;
-    let basis = Basis::around(direction);
-    Vec3::from(scene.info.centre) + basis.x * p.x + basis.y * p.y - direction * scene.info.radius
+/// On the disc that the scene's bounding sphere shows to light travelling along `direction`, before the scene; and one over
+/// the density of that place, m².
+///
+/// Where the subject is a speck in the scene, half of the photons lie about it: evenly as far as it reaches, ever sparser from
+/// there on, in every octave of distances as many. So those beside it, whose light it reflects, have little more power.
+fn on_disc(scene: &PackedScene, direction: Vec3, u: [f32; 2]) -> (Vec3, f32) {
+    let (radius, subject_radius) = (scene.info.radius, scene.info.subject_radius);
+    let (centre, basis) = (Vec3::from(scene.info.centre), Basis::around(direction));
+    let at = |p: Vec2| centre + basis.x * p.x + basis.y * p.y - direction * radius;
+    if subject_radius == 0.0 {
+        return (at(warp::disc(u) * radius), PI * radius * radius);
+    }
+    let to = Vec3::from(scene.info.subject_centre) - centre;
+    let middle = Vec2::new(to.dot(basis.x), to.dot(basis.y));
+    let share = scene.subject_share();
+    let is_about = u[0] < 0.5;
+    let unit = warp::disc([2.0 * u[0] - f32::from(!is_about), u[1]]);
+    let p = if is_about {
+        let t = unit.length_squared();
+        let distance = if t < share {
+            subject_radius * (t / share).sqrt()
+        } else {
+            subject_radius * ((t - share) / (1.0 - share) * (radius / subject_radius).ln()).exp()
+        };
+        middle + unit.normalize_or_zero() * distance
+    } else {
+        unit * radius
+    };
+    let distance = p.distance(middle);
+    // Rounding puts no sample outside of where it is from.
+    let about = if is_about || distance <= radius { share / distance.max(subject_radius).powi(2) } else { 0.0 };
+    let evenly = if !is_about || p.length() <= radius { 1.0 / (radius * radius) } else { 0.0 };
+    (at(p), TAU / (about + evenly))
 }

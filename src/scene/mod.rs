@@ -336,6 +336,7 @@ pub mod load;
 mod packed;
 pub mod settings;
 pub mod shipped;
+mod subject;
 
 pub use check::SceneError;
 pub use kd::{Accelerator, SceneKd};

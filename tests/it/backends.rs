@@ -281,6 +281,17 @@ fn photon_paths_agree_with_everything_lit() {
     photon_paths_agree(&everything(), &Params { n_paths: 150_000, ..params() });
 }
 
+/// On ground so wide that the rest is a speck: photons from far away come about it.
+#[test]
+fn photon_paths_agree_about_a_subject() {
+    let mut scene = everything();
+    let corners = [[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]].map(|[x, z]| 120.0 * Vec3::new(x, -0.001, z));
+    scene.meshes.push(Arc::new(quad("ground", corners, 0)));
+    let info = PackedScene::new(&scene).info;
+    assert!(info.subject_radius > 0.0 && info.subject_radius < 8.0 && info.radius > 150.0, "{info:?}");
+    photon_paths_agree(&scene, &Params { n_paths: 150_000, direct: Direct::Photons, ..params() });
+}
+
 #[test]
 fn photon_paths_agree_when_they_run_to_the_limit() {
     // More photons a path than one round stores, more in all than there is room for at first.

@@ -188,6 +188,49 @@ fn point_light_over_a_plane_with_the_bias_of_its_kernel() {
     assert!((sampled - f64::from(lit / PI)).abs() < 1e-3 * sampled, "{sampled}");
 }
 
+/// Photons of light from far away are sent about what is a speck in the scene; on the ground around it irradiance is the same
+/// everywhere, E = L·cos θ of a sun and πL of an even sky, but for what the speck, which is black, hides of it.
+#[test]
+fn far_light_is_as_bright_beside_a_subject_and_far_from_it() {
+    let albedo = 0.5;
+    let speck = Sphere { centre: Vec3::new(0.0, 5.0, 0.0), radius: 0.5, inward: false, material: 1 };
+    let mut scene = plane(1.0, 0.0);
+    let mut ground = Mesh::clone(&scene.meshes[0]);
+    ground.positions.iter_mut().for_each(|p| *p *= 40.0);
+    scene.meshes = vec![ground.into()];
+    scene.materials = vec![Material::diffuse("", Vec3::splat(albedo)), Material::diffuse("", Vec3::ZERO)];
+    scene.spheres = vec![speck];
+    let direction = Vec3::new(0.6, -0.8, 0.0);
+    let kind = PunctualKind::Directional;
+    let sun = PunctualLight { direction, kind, intensity: Vec3::ONE, ..point_light(Vec3::ZERO, 1.0) };
+    let mut sunny = scene.clone();
+    sunny.lights = vec![sun];
+    let mut overcast = scene;
+    overcast.lights = vec![];
+    overcast.environment = Some(Environment::uniform(Vec3::ONE));
+    let info = PackedScene::new(&sunny).info;
+    assert!(info.subject_radius == 0.5 && info.radius > 280.0, "{info:?}");
+    // How far to the side, how large a square, how large a radius.
+    for (aside, half, radius, error) in [(-3.0f32, 1.0, 0.5, 3e-2), (40.0, 4.0, 2.0, 4e-2), (-150.0, 30.0, 8.0, 4e-2)] {
+        let mut camera = down(half);
+        camera.world_from_camera.translation.x += aside;
+        let seen = |scene: &Scene, seed| {
+            let params = Params {
+                seed,
+                direct: Direct::Photons,
+                radius: FirstRadius::Fixed(radius),
+                n_paths: 100_000,
+                ..Params::new(4, 4)
+            };
+            mean(&render(scene, &camera, &params, 8))
+        };
+        assert_close(over_seeds(8, |seed| seen(&sunny, seed)), f64::from(albedo / PI * 0.8), error);
+        let away = speck.centre.distance(Vec3::new(aside, 0.0, 0.0));
+        let hidden = (speck.radius / away).powi(2) * speck.centre.y / away;
+        assert_close(over_seeds(8, |seed| seen(&overcast, seed)), f64::from(albedo * (1.0 - hidden)), error);
+    }
+}
+
 /// A white plane at y = 0 with a point light above its middle.
 fn plane(height: f32, intensity: f32) -> Scene {
     let corner = |x: f32, z: f32| Vec3::new(x * 5.0, 0.0, z * 5.0);

@@ -1,9 +1,8 @@
 //! Where to look at a scene from that does not say.
 
 use super::inside::Room;
-use super::subject::Subject;
 use super::view::Lamps;
-use crate::scene::{Camera, Scene, Sphere};
+use crate::scene::{Camera, Scene, Sphere, subject::Subject};
 use glam::Vec3;
 use rayon::prelude::*;
 

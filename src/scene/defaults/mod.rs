@@ -2,7 +2,6 @@
 
 mod camera;
 mod inside;
-mod subject;
 mod view;
 
 pub use camera::default_camera;

@@ -43,6 +43,22 @@ impl PackedScene {
         }
     }
 
+    /// Of the photons of far lights that are sent about the subject, the share within its radius. From there on their density
+    /// falls with the square of the distance, up to the radius of the scene; with this share it does not leap.
+    pub(crate) fn subject_share(&self) -> f32 {
+        1.0 / (1.0 + 2.0 * (self.info.radius / self.info.subject_radius).ln())
+    }
+
+    /// One over the density of a far light's photons, m²: on the subject, if there is one. By it such a light is weighed against
+    /// others.
+    fn photon_area(&self) -> f32 {
+        let [all, subject] = [self.info.radius, self.info.subject_radius].map(|radius| radius * radius);
+        match subject > 0.0 {
+            true => std::f32::consts::TAU / (1.0 / all + self.subject_share() / subject),
+            false => std::f32::consts::PI * all,
+        }
+    }
+
     /// After everything else.
     pub(super) fn pack_lights(&mut self, scene: &Scene) {
         let lamps = self.lamps(scene);
@@ -55,7 +71,7 @@ impl PackedScene {
         };
         self.lights = lamps.iter().map(light).collect();
         let mut powers: Vec<f32> = lamps.iter().map(|lamp| lamp.power).collect();
-        let disc = std::f32::consts::PI * self.info.radius * self.info.radius;
+        let disc = self.photon_area();
         for l in &scene.lights {
             let brightness = luminance(l.intensity);
             if brightness <= 0.0 {

@@ -8,6 +8,7 @@ use obvhs::aabb::Aabb;
 
 use super::PackedScene;
 use crate::layout::{self, NONE, Primitive, Vertex};
+use crate::scene::subject::Subject;
 use crate::scene::{AlphaMode, Material, Mesh, Scene, Sphere, Texture, bvh};
 
 /// What the primitives of a mesh or of a sphere were made from, but for lamps.
@@ -99,7 +100,9 @@ impl PackedScene {
     }
 
     fn take_shapes(&mut self, before: &Self) {
-        (self.info.centre, self.info.radius) = (before.info.centre, before.info.radius);
+        let of = &before.info;
+        (self.info.centre, self.info.radius) = (of.centre, of.radius);
+        (self.info.subject_centre, self.info.subject_radius) = (of.subject_centre, of.subject_radius);
         (self.nodes, self.vertices) = (Arc::clone(&before.nodes), Arc::clone(&before.vertices));
         (self.primitives, self.kd) = (Arc::clone(&before.primitives), before.kd.clone());
         if self.objects != before.objects {
@@ -122,6 +125,9 @@ impl PackedScene {
             self.info.centre = bounds.center().to_array();
             // Larger by more than rounding, so that rays from its surface start outside everything.
             self.info.radius = bounds.diagonal().length() * 0.5 * 1.001 + f32::MIN_POSITIVE;
+            if let Some((centre, radius)) = Subject::new(scene, &[], false).speck(self.info.radius) {
+                (self.info.subject_centre, self.info.subject_radius) = (centre.to_array(), radius);
+            }
         }
     }
 

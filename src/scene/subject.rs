@@ -1,6 +1,6 @@
 //! What a picture of a scene is of.
 
-use crate::scene::{Scene, Sphere};
+use super::{Scene, Sphere};
 use glam::Vec3;
 
 /// A sphere counts as much as a mesh of one: corners of 320 triangles.
@@ -31,10 +31,15 @@ impl<'a> Subject<'a> {
         let core = || {
             let (middle, reach) = whole.surfaces.core()?;
             let part = Self { within: Some((middle, FAR * reach)), ..whole };
-            let [(_, of_part), (_, of_whole)] = [part.bounding_sphere()?, whole.bounding_sphere()?];
-            (of_part > 0.0 && of_whole > MUCH_LARGER * of_part).then_some(part)
+            let (_, radius) = whole.bounding_sphere()?;
+            part.speck(radius).map(|_| part)
         };
         core().unwrap_or(whole)
+    }
+
+    /// A sphere about the subject of what `radius` is that of all, metres, if that makes it a speck.
+    pub fn speck(self, radius: f32) -> Option<(Vec3, f32)> {
+        self.bounding_sphere().filter(|&(_, of_subject)| of_subject > 0.0 && radius > MUCH_LARGER * of_subject)
     }
 
     /// All of it.
