@@ -1,6 +1,7 @@
 //! What a picture of a scene is of.
 
-use super::{Scene, Sphere};
+use super::defaults::is_lamp;
+use super::{Mesh, Scene, Sphere};
 use glam::Vec3;
 
 /// A sphere counts as much as a mesh of one: corners of 320 triangles.
@@ -11,12 +12,13 @@ const SAMPLES: usize = 1 << 15;
 const MOST: f64 = 0.9;
 /// What lies farther from the middle than so many times the core's reach is far outside.
 const FAR: f32 = 4.0;
-/// How many times larger than the rest a scene must be for that to be left out.
-const MUCH_LARGER: f32 = 20.0;
+/// How many times larger than the rest a scene must be for a picture of all to show a speck of it: a room that is not may hold
+/// one thing of many triangles.
+pub const SPECK: f32 = 50.0;
 
-/// The surfaces of a scene, and the spheres `more`, that a camera is to show: all, but for what lies far outside where nearly
-/// all of the corners are, if the whole is so much larger that the rest would be a speck. Such are the sky and the wide
-/// ground that models are put into, a lamp that stands for the sun, a corner that went astray.
+/// The surfaces of a scene, and the spheres `more`, that a picture is of: all, but for what lies far outside where nearly all of
+/// the corners are, lamps' left out, if the whole is so many times larger than the rest. Such are the sky and the wide ground
+/// that models are put into, a lamp that stands for the sun, a corner that went astray.
 #[derive(Clone, Copy)]
 pub struct Subject<'a> {
     surfaces: Surfaces<'a>,
@@ -29,21 +31,21 @@ impl<'a> Subject<'a> {
     pub fn new(scene: &'a Scene, more: &'a [Sphere], with_inward: bool) -> Self {
         let whole = Self::whole(scene, more, with_inward);
         let core = || {
-            let (middle, reach) = whole.surfaces.core()?;
-            let part = Self { within: Some((middle, FAR * reach)), ..whole };
-            let (_, radius) = whole.bounding_sphere()?;
-            part.speck(radius).map(|_| part)
+            let part = whole.core()?;
+            let [(_, of_part), (_, of_whole)] = [part.bounding_sphere()?, whole.bounding_sphere()?];
+            (of_part > 0.0 && of_whole > SPECK * of_part).then_some(part)
         };
         core().unwrap_or(whole)
     }
 
-    /// A sphere about the subject of what `radius` is that of all, metres, if that makes it a speck.
-    pub fn speck(self, radius: f32) -> Option<(Vec3, f32)> {
-        self.bounding_sphere().filter(|&(_, of_subject)| of_subject > 0.0 && radius > MUCH_LARGER * of_subject)
+    /// What is not far outside of where nearly all of the corners are, however large the rest is.
+    pub fn core(self) -> Option<Self> {
+        let (middle, reach) = self.surfaces.core()?;
+        Some(Self { within: Some((middle, FAR * reach)), ..self })
     }
 
     /// All of it.
-    fn whole(scene: &'a Scene, more: &'a [Sphere], with_inward: bool) -> Self {
+    pub fn whole(scene: &'a Scene, more: &'a [Sphere], with_inward: bool) -> Self {
         Self { surfaces: Surfaces { scene, more, with_inward }, within: None }
     }
 
@@ -95,31 +97,28 @@ struct Surfaces<'a> {
 }
 
 impl<'a> Surfaces<'a> {
-    /// Only vertices in use, once for each triangle: files carry stray ones.
-    fn corners(self) -> impl Iterator<Item = Vec3> + 'a {
-        let of_meshes = self.scene.meshes.iter();
-        of_meshes.flat_map(|mesh| {
-            mesh.triangles.iter().flatten().filter_map(move |&i| mesh.positions.get(i as usize).copied())
-        })
-    }
-
     fn spheres(self) -> impl Iterator<Item = &'a Sphere> {
         self.scene.spheres.iter().chain(self.more).filter(move |sphere| self.with_inward || !sphere.inward)
     }
 
     fn points(self) -> impl Iterator<Item = (Vec3, f32)> + 'a {
-        self.corners().map(|p| (p, 0.0)).chain(self.spheres().map(|s| (s.centre, s.radius)))
+        let all = self.scene.meshes.iter().flat_map(|mesh| corners(mesh));
+        all.map(|p| (p, 0.0)).chain(self.spheres().map(|s| (s.centre, s.radius)))
     }
 
-    /// Where most of the corners are: about their median, and how far that reaches.
+    /// Where most of the corners are: about their median, and how far that reaches. Lamps are not looked at, nor are `more`,
+    /// which may be some.
     fn core(self) -> Option<(Vec3, f32)> {
-        let n = self.scene.meshes.iter().map(|mesh| 3 * mesh.triangles.len()).sum::<usize>()
-            + SPHERE * self.spheres().count();
+        let is_lit = |material: usize| !self.scene.materials.get(material).is_some_and(is_lamp);
+        let meshes = self.scene.meshes.iter().filter(|mesh| is_lit(mesh.material));
+        let spheres = self.scene.spheres.iter().filter(|s| (self.with_inward || !s.inward) && is_lit(s.material));
+        let n_triangles: usize = meshes.clone().map(|mesh| mesh.triangles.len()).sum();
+        let n = 3 * n_triangles + SPHERE * spheres.clone().count();
         let step = n.div_ceil(SAMPLES).max(1);
         // Not a multiple of three: of every triangle another corner.
         let step = step + usize::from(step.is_multiple_of(3));
-        let of_spheres = self.spheres().flat_map(|s| std::iter::repeat_n((s.centre, s.radius), SPHERE));
-        let all = self.corners().map(|p| (p, 0.0)).chain(of_spheres);
+        let of_spheres = spheres.flat_map(|s| std::iter::repeat_n((s.centre, s.radius), SPHERE));
+        let all = meshes.flat_map(|mesh| corners(mesh)).map(|p| (p, 0.0)).chain(of_spheres);
         let sample: Vec<(Vec3, f32)> = all.step_by(step).filter(|(p, radius)| (p + radius).is_finite()).collect();
         if sample.is_empty() {
             return None;
@@ -134,10 +133,15 @@ impl<'a> Surfaces<'a> {
     }
 }
 
+/// Only vertices in use, once for each triangle: files carry stray ones.
+fn corners(mesh: &Mesh) -> impl Iterator<Item = Vec3> {
+    mesh.triangles.iter().flatten().filter_map(|&i| mesh.positions.get(i as usize).copied())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Mesh;
+    use crate::scene::Material;
 
     /// A cube of side 2 about `middle`, of so many triangles a side.
     fn cube(middle: Vec3, half: f32, n: u32) -> Mesh {
@@ -181,15 +185,22 @@ mod tests {
         // A ball on wide ground.
         let ground = cube(MIDDLE - Vec3::Y * 101.0, 100.0, 1);
         let ball = Sphere { centre: MIDDLE, radius: 1.0, inward: false, material: 0 };
-        near(&scene(vec![ground]), &[ball]);
+        near(&Scene { spheres: vec![ball], ..scene(vec![ground]) }, &[]);
     }
 
     #[test]
     fn else_all_of_it_is_the_subject() {
         let whole = |scene: &Scene, more: &[Sphere]| assert_eq!(scene.bounds(more), scene.subject_bounds(more));
         whole(&Scene::default(), &[]);
+        // A lamp of many triangles in a room of few, and one that settings add.
+        let materials = vec![Material::default(), Material::emitter("bulb", Vec3::ONE)];
+        let bulb = Mesh { material: 1, ..cube(MIDDLE, 0.05, 8) };
+        let lit = Sphere { centre: MIDDLE, radius: 0.05, inward: false, material: 1 };
+        let mut room = scene(vec![cube(MIDDLE, 5.0, 1), bulb]);
+        (room.materials, room.spheres) = (materials, vec![lit]);
+        whole(&room, &[Sphere { material: 0, ..lit }]);
         // Ground that is not so wide; two models far from each other; one that is a point; ground of many triangles.
-        whole(&scene(vec![cube(MIDDLE, 15.0, 1), cube(MIDDLE, 1.0, 8)]), &[]);
+        whole(&scene(vec![cube(MIDDLE, 45.0, 1), cube(MIDDLE, 1.0, 8)]), &[]);
         whole(&scene(vec![cube(MIDDLE, 1.0, 8), cube(-100.0 * MIDDLE, 1.0, 8)]), &[]);
         whole(&scene(vec![cube(MIDDLE, 0.0, 8), cube(MIDDLE, 1.0, 1)]), &[]);
         whole(&scene(vec![cube(MIDDLE, 1.0, 8), cube(MIDDLE, 1000.0, 8)]), &[]);

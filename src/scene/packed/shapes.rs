@@ -11,6 +11,9 @@ use crate::layout::{self, NONE, Primitive, Vertex};
 use crate::scene::subject::Subject;
 use crate::scene::{AlphaMode, Material, Mesh, Scene, Sphere, Texture, bvh};
 
+/// How many times larger than its subject a scene must be for far lights to send photons about that.
+const SMALL: f32 = 10.0;
+
 /// What the primitives of a mesh or of a sphere were made from, but for lamps.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Object {
@@ -125,7 +128,9 @@ impl PackedScene {
             self.info.centre = bounds.center().to_array();
             // Larger by more than rounding, so that rays from its surface start outside everything.
             self.info.radius = bounds.diagonal().length() * 0.5 * 1.001 + f32::MIN_POSITIVE;
-            if let Some((centre, radius)) = Subject::new(scene, &[], false).speck(self.info.radius) {
+            let subject = Subject::whole(scene, &[], false).core().and_then(Subject::bounding_sphere);
+            let is_small = |&(_, radius): &(Vec3, f32)| radius > 0.0 && self.info.radius > SMALL * radius;
+            if let Some((centre, radius)) = subject.filter(is_small) {
                 (self.info.subject_centre, self.info.subject_radius) = (centre.to_array(), radius);
             }
         }
